@@ -1,0 +1,18 @@
+#include <cstdio>
+#include <exception>
+
+#include "apps/command.h"
+
+int main(int argc, char** argv) {
+  CLI::App app("rotslam: camera path and sparse map from one calibrated video, rotations first",
+               "rotslam");
+  app.require_subcommand(1);
+  rotslam::Action action;
+  CLI11_PARSE(app, argc, argv);
+  try {
+    return action();
+  } catch (const std::exception& error) {
+    std::fprintf(stderr, "rotslam: %s\n", error.what());
+    return 1;
+  }
+}

@@ -1,0 +1,32 @@
+# Build requirements shared by all targets; they ride on targets and set no global flag.
+
+# Warnings for our own code only; third-party headers are SYSTEM.
+add_library(rotslam_warnings INTERFACE)
+add_library(rotslam::warnings ALIAS rotslam_warnings)
+target_compile_options(rotslam_warnings INTERFACE
+  -Wall -Wextra -Wconversion -Wshadow -Wno-sign-conversion
+  $<$<BOOL:${ROTSLAM_WARNINGS_AS_ERRORS}>:-Werror>)
+
+# x86-64-v2 without AVX: Debian's Eigen-based libraries (OpenGV, PCL, Ceres) are built without it, and Eigen's
+# alignment rules change with it.
+set(ROTSLAM_ARCH_FLAGS "")
+if(CMAKE_SYSTEM_PROCESSOR MATCHES "x86_64|AMD64")
+  set(ROTSLAM_ARCH_FLAGS -msse4.2 -mpopcnt)
+endif()
+
+# rotslam_add_library(<name> SOURCES ... [PUBLIC ...] [PRIVATE ...])
+# Defines rotslam_<name>, exported as rotslam::<name>; includes carry the folder ("krot/bisection.h").
+function(rotslam_add_library name)
+  cmake_parse_arguments(ARG "" "" "SOURCES;PUBLIC;PRIVATE" ${ARGN})
+  add_library(rotslam_${name} STATIC ${ARG_SOURCES})
+  add_library(rotslam::${name} ALIAS rotslam_${name})
+  set_target_properties(rotslam_${name} PROPERTIES EXPORT_NAME ${name} POSITION_INDEPENDENT_CODE ON)
+  target_compile_features(rotslam_${name} PUBLIC cxx_std_20)
+  target_compile_options(rotslam_${name} PRIVATE ${ROTSLAM_ARCH_FLAGS})
+  target_include_directories(rotslam_${name} PUBLIC
+    $<BUILD_INTERFACE:${PROJECT_SOURCE_DIR}>
+    $<INSTALL_INTERFACE:${CMAKE_INSTALL_INCLUDEDIR}/rotslam>)
+  target_link_libraries(rotslam_${name} PUBLIC ${ARG_PUBLIC}
+    PRIVATE ${ARG_PRIVATE} $<BUILD_INTERFACE:rotslam::warnings>)
+  set_property(GLOBAL APPEND PROPERTY ROTSLAM_INSTALLED_TARGETS rotslam_${name})
+endfunction()

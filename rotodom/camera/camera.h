@@ -1,0 +1,48 @@
+#pragma once
+
+#include <array>
+#include <optional>
+#include <string>
+
+#include <Eigen/Core>
+
+namespace rotslam {
+
+enum class CameraModel {
+  kPinhole,      // no distortion
+  kRadtan,       // OpenCV: k1 k2 p1 p2 k3
+  kEquidistant,  // Kannala-Brandt as in OpenCV's fisheye module: k1 k2 k3 k4
+};
+
+/// One calibrated camera. x right, y down, z forward; pixel centres at integer coordinates.
+struct Camera {
+  CameraModel model = CameraModel::kPinhole;
+  int width = 0;  // 0 by 0: the calibration file does not say, the images decide
+  int height = 0;
+  double fx = 0.0;
+  double fy = 0.0;
+  double cx = 0.0;
+  double cy = 0.0;
+  std::array<double, 5> distortion = {};  // k1 k2 p1 p2 k3, or k1 k2 k3 k4 and a zero
+
+  /// Pixel that shows `point_in_cam`; nullopt where the model does not reach (behind the image
+  /// plane for kPinhole and kRadtan, beyond the fold of the distortion polynomial).
+  /// @param J  when given, receives d(pixel) / d(point_in_cam).
+  std::optional<Eigen::Vector2d> Project(const Eigen::Vector3d& point_in_cam,
+                                         Eigen::Matrix<double, 2, 3>* J = nullptr) const;
+
+  /// Unit bearing of a pixel; nullopt where the distortion cannot be inverted.
+  /// Error: Project(Unproject(p)) == p to 1e-9 px where the model is invertible.
+  std::optional<Eigen::Vector3d> Unproject(const Eigen::Vector2d& pixel) const;
+
+  /// Pixels per radian near the image centre: the mean of fx and fy.
+  double MeanFocal() const { return 0.5 * (fx + fy); }
+
+  /// What is wrong with the numbers, in one line; nullopt when all is well.
+  std::optional<std::string> Problem() const;
+};
+
+/// One line for people: model, fx, fy, cx, cy, distortion, size.
+std::string Describe(const Camera& camera);
+
+}  // namespace rotslam

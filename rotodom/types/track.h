@@ -1,0 +1,29 @@
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <vector>
+
+#include <Eigen/Core>
+
+#include "rotodom/types/ids.h"
+
+namespace rotslam {
+
+/// One sighting of a scene point.
+struct Observation {
+  FrameId frame;
+  Eigen::Vector2d
+      keypoint_px;  // where the distorted image shows it; pixel centres at integer coordinates
+  Eigen::Vector3d bearing;  // unit vector to it in the camera frame
+  double sigma_px = 1.0;    // standard deviation of the keypoint, per image axis
+};
+
+/// One scene point seen in several frames: at most one observation per frame, frames ascending.
+struct Track {
+  TrackId id;
+  std::vector<Observation> observations;
+  std::array<std::uint8_t, 3> rgb = {128, 128, 128};
+};
+
+}  // namespace rotslam
