@@ -14,6 +14,9 @@ enum class CameraModel {
   kEquidistant,  // Kannala-Brandt as in OpenCV's fisheye module: k1 k2 k3 k4
 };
 
+/// `pinhole`, `radtan` or `equidistant`, as our camera files spell it.
+const char* Name(CameraModel model);
+
 /// One calibrated camera. x right, y down, z forward; pixel centres at integer coordinates.
 struct Camera {
   CameraModel model = CameraModel::kPinhole;
@@ -27,11 +30,12 @@ struct Camera {
 
   /// Pixel that shows `point_in_cam`; nullopt where the model does not reach (behind the image
   /// plane for kPinhole and kRadtan, beyond the fold of the distortion polynomial).
-  /// @param J  when given, receives d(pixel) / d(point_in_cam).
+  /// @param J  when given, receives d(pixel) / d(point_in_cam); untouched when nullopt.
   std::optional<Eigen::Vector2d> Project(const Eigen::Vector3d& point_in_cam,
                                          Eigen::Matrix<double, 2, 3>* J = nullptr) const;
 
-  /// Unit bearing of a pixel; nullopt where the distortion cannot be inverted.
+  /// Unit bearing of a pixel; nullopt where the distortion cannot be inverted. The pixel may lie
+  /// outside the image.
   /// Error: Project(Unproject(p)) == p to 1e-9 px where the model is invertible.
   std::optional<Eigen::Vector3d> Unproject(const Eigen::Vector2d& pixel) const;
 
@@ -40,6 +44,8 @@ struct Camera {
 
   /// What is wrong with the numbers, in one line; nullopt when all is well.
   std::optional<std::string> Problem() const;
+
+  bool operator==(const Camera&) const = default;
 };
 
 /// One line for people: model, fx, fy, cx, cy, distortion, size.
