@@ -1,0 +1,309 @@
+#include "rotodom/sequence/sequence.h"
+
+#include <algorithm>
+#include <cmath>
+#include <fstream>
+#include <iomanip>
+#include <iterator>
+#include <sstream>
+#include <stdexcept>
+#include <utility>
+
+#include <opencv2/core.hpp>
+#include <opencv2/imgcodecs.hpp>
+#include <opencv2/imgproc.hpp>
+#include <opencv2/videoio.hpp>
+
+#include "rotodom/sequence/layout.h"
+
+namespace rotslam {
+namespace {
+
+namespace fs = std::filesystem;
+
+std::string SizeText(const cv::Size& size) {
+  return std::to_string(size.width) + "x" + std::to_string(size.height);
+}
+
+// 8 bits, 1 or 3 channels; empty, with `problem` set, when the pixels are of another kind.
+cv::Mat ToEightBits(cv::Mat image, std::string& problem) {
+  if (image.channels() == 4) cv::cvtColor(image, image, cv::COLOR_BGRA2BGR);
+  if (image.depth() == CV_16U) {
+    cv::Mat scaled;
+    image.convertTo(scaled, CV_8U, 255.0 / 65535.0);
+    image = scaled;
+  }
+  if (image.depth() == CV_8U && (image.channels() == 1 || image.channels() == 3)) return image;
+  problem = "pixels are neither 8 nor 16 bits, or not of 1, 3 or 4 channels";
+  return {};
+}
+
+// A JPEG file that ends before its end marker decodes to grey below the break.
+bool IsCutOffJpeg(const std::vector<unsigned char>& bytes) {
+  if (bytes.size() < 4 || bytes[0] != 0xff || bytes[1] != 0xd8) return false;
+  const unsigned char kEnd[] = {0xff, 0xd9};
+  return std::find_end(bytes.begin(), bytes.end(), std::begin(kEnd), std::end(kEnd)) == bytes.end();
+}
+
+cv::Mat DecodeImage(const fs::path& file, std::string& problem) {
+  std::ifstream stream(file, std::ios::binary);
+  const std::vector<unsigned char> bytes{std::istreambuf_iterator<char>(stream), {}};
+  if (!stream.is_open() || stream.bad()) {
+    problem = "file cannot be opened";
+    return {};
+  }
+  if (bytes.empty()) {
+    problem = "file is empty";
+    return {};
+  }
+  if (IsCutOffJpeg(bytes)) {
+    problem = "JPEG data are cut off";
+    return {};
+  }
+  cv::Mat image;
+  try {
+    image = cv::imdecode(bytes,
+                         cv::IMREAD_ANYCOLOR | cv::IMREAD_ANYDEPTH | cv::IMREAD_IGNORE_ORIENTATION);
+  } catch (const cv::Exception&) {
+    // Such as a header that claims a size beyond OpenCV's limit.
+  }
+  if (image.empty()) {
+    problem = "image cannot be decoded";
+    return {};
+  }
+  return ToEightBits(std::move(image), problem);
+}
+
+[[noreturn]] void FailBeyondEnd(const fs::path& place, int first, int num_frames) {
+  throw std::runtime_error(place.string() + ": first frame " + std::to_string(first) +
+                           " asked for, but there are only " + std::to_string(num_frames));
+}
+
+void CheckIncreasing(const std::vector<ImageEntry>& entries) {
+  for (std::size_t k = 1; k < entries.size(); ++k) {
+    if (entries[k].timestamp_s > entries[k - 1].timestamp_s) continue;
+    std::ostringstream text;
+    text << std::fixed << std::setprecision(9) << entries[k].file.string() << ": timestamp "
+         << entries[k].timestamp_s << " s is not later than the " << entries[k - 1].timestamp_s
+         << " s of the frame before it, " << entries[k - 1].file.filename().string();
+    throw std::runtime_error(text.str());
+  }
+}
+
+class FileSequence : public Sequence {
+ public:
+  FileSequence(Layout layout, const SequenceOptions& options) {
+    kind_ = layout.kind;
+    place_ = std::move(layout.folder);
+    camera_file_ = std::move(layout.camera_file);
+    ground_truth_file_ = std::move(layout.ground_truth_file);
+    const int num_entries = static_cast<int>(layout.entries.size());
+    if (options.first >= num_entries) FailBeyondEnd(place_, options.first, num_entries);
+    const int end = options.last < 0 ? num_entries : std::min(options.last + 1, num_entries);
+    for (std::int64_t k = options.first; k < end; k += options.stride) {
+      entries_.push_back(std::move(layout.entries[static_cast<std::size_t>(k)]));
+      timestamps_s_.push_back(entries_.back().timestamp_s);
+    }
+    num_frames_ = static_cast<int>(entries_.size());
+    CheckIncreasing(entries_);
+    FindImageSize();
+  }
+
+ private:
+  void FindImageSize() {
+    std::string first_problem;
+    for (const ImageEntry& entry : entries_) {
+      std::string problem;
+      const cv::Mat image = DecodeImage(entry.file, problem);
+      if (!image.empty()) {
+        image_size_ = image.size();
+        return;
+      }
+      if (first_problem.empty()) first_problem = problem;
+    }
+    throw std::runtime_error(place_.string() + ": none of the " + std::to_string(num_frames_) +
+                             " images can be read; " + entries_.front().file.filename().string() +
+                             ": " + first_problem);
+  }
+
+  std::optional<Frame> Decode() override {
+    if (next_ == num_frames_) return std::nullopt;
+    const ImageEntry& entry = entries_[next_];
+    Frame frame;
+    frame.id = FrameId{next_++};
+    frame.timestamp_s = entry.timestamp_s;
+    frame.name = entry.file.filename().string();
+    frame.image = DecodeImage(entry.file, frame.problem);
+    return frame;
+  }
+
+  std::vector<ImageEntry> entries_;
+  int next_ = 0;
+};
+
+class VideoSequence : public Sequence {
+ public:
+  VideoSequence(Layout layout, const SequenceOptions& options) : options_(options) {
+    kind_ = SequenceKind::kVideo;
+    place_ = std::move(layout.folder);
+    camera_file_ = std::move(layout.camera_file);
+    Probe();
+    capture_.open(place_.string());
+    while (number_ < options.first) {
+      if (!Grab()) FailBeyondEnd(place_, options.first, number_);
+    }
+    const double claimed = capture_.get(cv::CAP_PROP_FRAME_COUNT);
+    if (claimed > 0.0 && claimed < 1e9) {
+      int end = static_cast<int>(claimed);
+      if (options.last >= 0) end = std::min(end, options.last + 1);
+      num_frames_ = std::max(0, (end - options.first + options.stride - 1) / options.stride);
+    }
+  }
+
+ private:
+  // Reads the first frames once: is there a picture, and do their timestamps increase?
+  void Probe() {
+    constexpr int kProbedFrames = 10;
+    cv::VideoCapture capture(place_.string());
+    if (!capture.isOpened()) {
+      throw std::runtime_error(place_.string() + ": not a video that OpenCV can open");
+    }
+    double previous_ms = -1.0;
+    for (int k = 0; k < kProbedFrames && capture.grab(); ++k) {
+      const double time_ms = capture.get(cv::CAP_PROP_POS_MSEC);
+      has_timestamps_ = has_timestamps_ && std::isfinite(time_ms) && time_ms > previous_ms;
+      previous_ms = time_ms;
+      cv::Mat image;
+      if (image_size_.empty() && capture.retrieve(image)) image_size_ = image.size();
+    }
+    if (image_size_.empty()) {
+      throw std::runtime_error(place_.string() + ": video without a readable frame");
+    }
+  }
+
+  // Steps to the next frame of the file; false after the last.
+  bool Grab() {
+    if (!capture_.grab()) return false;
+    ++number_;
+    const double fallback_s = has_timestamps_ ? time_s_ + 1.0 / options_.fps  // a gap in good ones
+                                              : (number_ - 1) / options_.fps;
+    const double own_s = capture_.get(cv::CAP_PROP_POS_MSEC) / 1000.0;
+    const bool own_is_good =
+        has_timestamps_ && std::isfinite(own_s) && (number_ == 1 || own_s > time_s_);
+    time_s_ = own_is_good ? own_s : fallback_s;
+    return true;
+  }
+
+  std::optional<Frame> Decode() override {
+    const int num_skipped = timestamps_s_.empty() ? 0 : options_.stride - 1;
+    bool there = options_.last < 0 || number_ + num_skipped <= options_.last;
+    for (int k = 0; k <= num_skipped && there; ++k) there = Grab();
+    if (!there) {
+      num_frames_ = static_cast<int>(timestamps_s_.size());
+      return std::nullopt;
+    }
+    Frame frame;
+    frame.id = FrameId{static_cast<int>(timestamps_s_.size())};
+    frame.timestamp_s = time_s_;
+    std::ostringstream name;
+    name << std::setw(6) << std::setfill('0') << number_ - 1;
+    frame.name = name.str();
+    timestamps_s_.push_back(time_s_);
+    cv::Mat image;
+    if (capture_.retrieve(image) && !image.empty()) {
+      // The capture reuses its buffer.
+      frame.image = ToEightBits(image.clone(), frame.problem);
+    } else {
+      frame.problem = "frame of the video cannot be decoded";
+    }
+    return frame;
+  }
+
+  SequenceOptions options_;
+  cv::VideoCapture capture_;
+  bool has_timestamps_ = true;
+  int number_ = 0;       // frames of the file grabbed so far
+  double time_s_ = 0.0;  // of the frame grabbed last
+};
+
+const char* KindText(SequenceKind kind) {
+  switch (kind) {
+    case SequenceKind::kImageFolder:
+      return "image folder";
+    case SequenceKind::kKittiOdometry:
+      return "KITTI odometry";
+    case SequenceKind::kTumRgbd:
+      return "TUM RGB-D";
+    case SequenceKind::kEuroc:
+      return "EuRoC";
+    case SequenceKind::kVideo:
+      return "video";
+  }
+  return "unknown";
+}
+
+}  // namespace
+
+std::optional<std::string> SequenceOptions::Problem() const {
+  if (first < 0) return "first is " + std::to_string(first) + ", must be at least 0";
+  if (last < -1) return "last is " + std::to_string(last) + ", must be at least -1";
+  if (last >= 0 && last < first) {
+    return "last is " + std::to_string(last) + ", must not be before first, " +
+           std::to_string(first);
+  }
+  if (stride < 1) return "stride is " + std::to_string(stride) + ", must be at least 1";
+  if (!(fps > 0.0) || !std::isfinite(fps)) {
+    return "fps is " + std::to_string(fps) + ", must be positive";
+  }
+  return std::nullopt;
+}
+
+std::optional<Frame> Sequence::Next() {
+  std::optional<Frame> frame = Decode();
+  if (frame && !frame->image.empty() && frame->image.size() != image_size_) {
+    frame->problem = "image is " + SizeText(frame->image.size()) + ", the first readable one is " +
+                     SizeText(image_size_);
+    frame->image.release();
+  }
+  return frame;
+}
+
+std::string Sequence::Describe() const {
+  std::ostringstream text;
+  text << KindText(kind_) << ", ";
+  if (num_frames_ >= 0) text << num_frames_ << " frames, ";
+  text << SizeText(image_size_) << ", ";
+  if (kind_ != SequenceKind::kVideo) {
+    text << std::fixed << std::setprecision(1) << timestamps_s_.back() - timestamps_s_.front()
+         << " s, ";
+  }
+  text << place_.string();
+  return text.str();
+}
+
+std::unique_ptr<Sequence> OpenSequence(const fs::path& path, const SequenceOptions& options) {
+  if (const auto problem = options.Problem()) {
+    throw std::invalid_argument("sequence options: " + *problem);
+  }
+  Layout layout = FindLayout(path, options.fps);
+  if (layout.kind == SequenceKind::kVideo) {
+    return std::make_unique<VideoSequence>(std::move(layout), options);
+  }
+  return std::make_unique<FileSequence>(std::move(layout), options);
+}
+
+Camera MatchToImages(const Camera& camera, const cv::Size& image_size) {
+  Camera matched = camera;
+  if (camera.width == 0 && camera.height == 0) {
+    matched.width = image_size.width;
+    matched.height = image_size.height;
+  }
+  if (matched.width != image_size.width || matched.height != image_size.height) {
+    throw std::runtime_error("camera says " + SizeText({camera.width, camera.height}) +
+                             ", images are " + SizeText(image_size) +
+                             ": give the calibration of these images");
+  }
+  return matched;
+}
+
+}  // namespace rotslam

@@ -1,0 +1,132 @@
+#pragma once
+
+#include <cstddef>
+#include <filesystem>
+#include <memory>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include <opencv2/core/mat.hpp>
+
+#include "rotodom/camera/camera.h"
+#include "rotodom/types/ids.h"
+
+namespace rotslam {
+
+/// Which frames of a sequence to read, and when they were taken if nothing else says so.
+struct SequenceOptions {
+  // Number of the first input frame to use; the sequence's own first frame is 0.
+  int first = 0;
+  // Number of the last input frame to use, inclusive; -1 or beyond the end: up to the end.
+  int last = -1;
+  // Use every stride-th frame. More than 1 widens the motion between frames.
+  int stride = 1;
+  // Frames per second, for input without timestamps: time = number in the sequence / fps. 30 is
+  // what phones and hand-held data sets record. Only the timestamps move with it.
+  double fps = 30.0;
+
+  std::optional<std::string> Problem() const;
+
+  template <class Visitor>
+  void Visit(Visitor&& visit) {
+    visit("first", first);
+    visit("last", last);
+    visit("stride", stride);
+    visit("fps", fps);
+  }
+};
+
+enum class SequenceKind {
+  kImageFolder,
+  kKittiOdometry,
+  kTumRgbd,
+  kEuroc,
+  kVideo,
+};
+
+/// One input frame.
+struct Frame {
+  FrameId id;                // 0, 1, 2 ... after first, last and stride
+  double timestamp_s = 0.0;  // strictly increasing with id
+  cv::Mat image;             // 8-bit, 1 channel or 3 (blue, green, red); empty when unreadable
+  std::string name;          // file name, or the number of the frame in a video
+  std::string problem;       // why the image is empty, in one line; empty when it is not
+};
+
+/// The frames of one input, in order, each once. Made by OpenSequence.
+class Sequence {
+ public:
+  virtual ~Sequence() = default;
+  Sequence(const Sequence&) = delete;
+  Sequence& operator=(const Sequence&) = delete;
+
+  /// The next frame; nullopt after the last. An image that cannot be decoded, or whose size is not
+  /// image_size(), comes as an empty one with `problem` set: it never throws.
+  std::optional<Frame> Next();
+
+  /// Frames that Next() gives in all. For a video it is what the file claims until the last frame
+  /// has been read, and -1 where the file claims nothing.
+  int NumFrames() const { return num_frames_; }
+
+  /// Times of the frames, by id. Complete from the start, but for a video: there it grows by one
+  /// with each Next().
+  const std::vector<double>& timestamps_s() const { return timestamps_s_; }
+
+  /// Size of the first readable image; every other image must have it.
+  cv::Size image_size() const { return image_size_; }
+
+  SequenceKind kind() const { return kind_; }
+
+  /// One line for people: kind, number of frames, size, duration, place.
+  std::string Describe() const;
+
+  /// Calibration that lies with the images: `camera.yaml` of our own in any layout, else the data
+  /// set's file (KITTI `calib.txt`, EuRoC `sensor.yaml`). For ReadCamera.
+  const std::optional<std::filesystem::path>& CameraFile() const { return camera_file_; }
+
+  /// Camera trajectory that lies with the images, in TUM or KITTI form: `groundtruth_tum.txt`,
+  /// `groundtruth_cam0_tum.txt`, `groundtruth.txt`, `poses.txt`.
+  const std::optional<std::filesystem::path>& GroundTruthFile() const { return ground_truth_file_; }
+
+ protected:
+  Sequence() = default;
+
+  // The next frame as decoded, its size unchecked; nullopt after the last.
+  virtual std::optional<Frame> Decode() = 0;
+
+  SequenceKind kind_ = SequenceKind::kImageFolder;
+  std::filesystem::path place_;
+  int num_frames_ = -1;
+  std::vector<double> timestamps_s_;
+  cv::Size image_size_;
+  std::optional<std::filesystem::path> camera_file_;
+  std::optional<std::filesystem::path> ground_truth_file_;
+};
+
+/// Recognises what lies at `path` by looking at it:
+///   video          a file that OpenCV can open
+///   EuRoC ASL      `mav0/cam0/data.csv` below the path, or the path is `mav0` or a `cam*` of it
+///   KITTI odometry `image_0/` (else `image_2/`) and `times.txt`; or the path is such an `image_*`
+///   TUM RGB-D      `rgb.txt`
+///   image folder   images in the folder itself, else in its `images/`
+/// Timestamps come from the data set; in an image folder from the file names where each is a number
+/// with a decimal point (seconds) or the ms, us or ns since 1970 of a date in this century, else
+/// from `fps`, and images are ordered by time or, digits counting as numbers, by name. A video
+/// keeps its own timestamps where its first frames have increasing ones.
+///
+/// Images are taken as stored, whatever orientation their EXIF data ask for (a phone changes its
+/// mind in mid-sequence when it looks up or down); videos are turned upright as players do.
+/// 16-bit images are scaled to 8 bits, transparency is dropped.
+///
+/// Throws std::invalid_argument when options.Problem(); std::runtime_error, with path and reason in
+/// one line, when nothing is there, nothing can be read, a list is malformed, or timestamps do not
+/// increase.
+std::unique_ptr<Sequence> OpenSequence(const std::filesystem::path& path,
+                                       const SequenceOptions& options);
+
+/// `camera` with the size of the images, where it did not say one itself. Throws std::runtime_error
+/// (`camera says 640x480, images are 752x480: ...`) where it says another.
+Camera MatchToImages(const Camera& camera, const cv::Size& image_size);
+
+}  // namespace rotslam
