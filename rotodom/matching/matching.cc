@@ -1,0 +1,273 @@
+#include "rotodom/matching/matching.h"
+
+#include <algorithm>
+#include <array>
+#include <bit>
+#include <cmath>
+#include <cstring>
+#include <limits>
+#include <numbers>
+#include <stdexcept>
+
+#include <opencv2/video/tracking.hpp>
+
+namespace rotslam {
+namespace {
+
+constexpr int kCellPx = 32;
+
+int HammingDistance(const std::uint8_t* a, const std::uint8_t* b) {
+  int distance = 0;
+  for (int word = 0; word < 4; ++word) {
+    std::uint64_t x;
+    std::uint64_t y;
+    std::memcpy(&x, a + 8 * word, 8);
+    std::memcpy(&y, b + 8 * word, 8);
+    distance += std::popcount(x ^ y);
+  }
+  return distance;
+}
+
+// Keypoints of one frame by image cell.
+class KeypointGrid {
+ public:
+  explicit KeypointGrid(const Features& features) : features_(features) {
+    for (const Eigen::Vector2d& keypoint : features.keypoints_px) {
+      columns_ = std::max(columns_, static_cast<int>(keypoint.x()) / kCellPx + 1);
+      rows_ = std::max(rows_, static_cast<int>(keypoint.y()) / kCellPx + 1);
+    }
+    cells_.resize(static_cast<std::size_t>(columns_) * rows_);
+    for (int index = 0; index < features.size(); ++index) {
+      const Eigen::Vector2d& keypoint = features.keypoints_px[index];
+      const int column = std::max(0, static_cast<int>(keypoint.x()) / kCellPx);
+      const int row = std::max(0, static_cast<int>(keypoint.y()) / kCellPx);
+      cells_[row * columns_ + column].push_back(index);
+    }
+  }
+
+  template <class Visitor>
+  void VisitWithin(const Eigen::Vector2d& center, double radius, Visitor&& visit) const {
+    const auto cell_of = [](double coordinate, int count) {
+      return static_cast<int>(std::clamp(std::floor(coordinate / kCellPx), -1.0, double(count)));
+    };
+    const int first_column = std::max(0, cell_of(center.x() - radius, columns_));
+    const int last_column = std::min(columns_ - 1, cell_of(center.x() + radius, columns_));
+    const int first_row = std::max(0, cell_of(center.y() - radius, rows_));
+    const int last_row = std::min(rows_ - 1, cell_of(center.y() + radius, rows_));
+    for (int row = first_row; row <= last_row; ++row) {
+      for (int column = first_column; column <= last_column; ++column) {
+        for (const int index : cells_[row * columns_ + column]) {
+          if ((features_.keypoints_px[index] - center).squaredNorm() <= radius * radius)
+            visit(index);
+        }
+      }
+    }
+  }
+
+ private:
+  const Features& features_;
+  int columns_ = 0;
+  int rows_ = 0;
+  std::vector<std::vector<int>> cells_;
+};
+
+struct Candidate {
+  int j = -1;
+  int distance = std::numeric_limits<int>::max();
+};
+
+// Best candidate of each keypoint of frame i; j = -1 where there is none.
+std::vector<Candidate> FindBest(const Features& features_i,
+                                const Features& features_j,
+                                const std::vector<std::optional<Eigen::Vector2d>>& predicted_px,
+                                const KeypointGrid& grid_j,
+                                double radius,
+                                const MatchingOptions& options) {
+  std::vector<Candidate> best(features_i.size());
+  for (int i = 0; i < features_i.size(); ++i) {
+    if (!predicted_px[i]) continue;
+    const std::uint8_t* descriptor = features_i.descriptors.ptr<std::uint8_t>(i);
+    Candidate first;
+    Candidate second;
+    grid_j.VisitWithin(*predicted_px[i], radius, [&](int j) {
+      if (std::abs(features_j.levels[j] - features_i.levels[i]) > options.max_level_step) return;
+      const int distance = HammingDistance(descriptor, features_j.descriptors.ptr<std::uint8_t>(j));
+      if (distance < first.distance) {
+        second = first;
+        first = {j, distance};
+      } else if (distance < second.distance) {
+        second = {j, distance};
+      }
+    });
+    if (first.j < 0 || first.distance > options.max_distance) continue;
+    // The same corner found on the next level is no rival.
+    const bool rival =
+        second.j >= 0 &&
+        (features_j.keypoints_px[second.j] - features_j.keypoints_px[first.j]).norm() > 4.0;
+    if (rival && first.distance > options.ratio * second.distance) continue;
+    best[i] = first;
+  }
+  return best;
+}
+
+// Keeps, of all keypoints of frame i that chose the same one of frame j, the nearest.
+void KeepMutual(std::vector<Candidate>& best, int num_j) {
+  std::vector<int> owner(num_j, -1);
+  for (int i = 0; i < static_cast<int>(best.size()); ++i) {
+    if (best[i].j < 0) continue;
+    int& current = owner[best[i].j];
+    if (current < 0 || best[i].distance < best[current].distance) current = i;
+  }
+  for (int i = 0; i < static_cast<int>(best.size()); ++i) {
+    if (best[i].j >= 0 && owner[best[i].j] != i) best[i].j = -1;
+  }
+}
+
+// All patches turn by about the same angle between two frames: keeps the matches near the commonest
+// turn.
+void KeepCommonTurn(std::vector<Candidate>& best,
+                    const Features& features_i,
+                    const Features& features_j) {
+  constexpr int kBins = 24;
+  const auto bin_of = [&](int i) {
+    const double turn = features_j.angles_rad[best[i].j] - features_i.angles_rad[i];
+    const double fraction = turn / (2.0 * std::numbers::pi);
+    return static_cast<int>((fraction - std::floor(fraction)) * kBins) % kBins;
+  };
+  std::array<int, kBins> histogram = {};
+  for (int i = 0; i < static_cast<int>(best.size()); ++i) {
+    if (best[i].j >= 0) ++histogram[bin_of(i)];
+  }
+  int common = 0;
+  int most = -1;
+  for (int bin = 0; bin < kBins; ++bin) {
+    const int around =
+        histogram[(bin + kBins - 1) % kBins] + histogram[bin] + histogram[(bin + 1) % kBins];
+    if (around > most) {
+      most = around;
+      common = bin;
+    }
+  }
+  for (int i = 0; i < static_cast<int>(best.size()); ++i) {
+    if (best[i].j < 0) continue;
+    const int away = std::abs(bin_of(i) - common);
+    if (std::min(away, kBins - away) > 1) best[i].j = -1;
+  }
+}
+
+}  // namespace
+
+std::optional<std::string> MatchingOptions::Problem() const {
+  const auto problem = [](const char* name, auto value, const char* limit) {
+    return std::string(name) + " = " + std::to_string(value) + ": must be " + limit;
+  };
+  if (!(radius_px > 0.0)) return problem("radius_px", radius_px, "positive");
+  if (!(wide_radius_px >= radius_px))
+    return problem("wide_radius_px", wide_radius_px, "at least radius_px");
+  if (min_matches < 0) return problem("min_matches", min_matches, "zero or more");
+  if (max_distance < 0 || max_distance > 256)
+    return problem("max_distance", max_distance, "0 to 256");
+  if (!(ratio > 0.0 && ratio <= 1.0)) return problem("ratio", ratio, "above 0 and at most 1");
+  if (max_level_step < 0) return problem("max_level_step", max_level_step, "zero or more");
+  if (patch_px < 5 || patch_px % 2 == 0) return problem("patch_px", patch_px, "odd and at least 5");
+  if (patch_levels < 1) return problem("patch_levels", patch_levels, "at least 1");
+  if (!(max_correction_px > 0.0))
+    return problem("max_correction_px", max_correction_px, "positive");
+  return std::nullopt;
+}
+
+std::vector<cv::Mat> BuildPatchPyramid(const cv::Mat& grey, const MatchingOptions& options) {
+  std::vector<cv::Mat> pyramid;
+  cv::buildOpticalFlowPyramid(
+      grey, pyramid, cv::Size(options.patch_px, options.patch_px), options.patch_levels - 1);
+  return pyramid;
+}
+
+Matches MatchFeatures(const Features& features_i,
+                      const Features& features_j,
+                      const Rotation& predicted_j_from_i,
+                      const Camera& camera,
+                      const MatchingOptions& options) {
+  if (const auto problem = options.Problem()) {
+    throw std::invalid_argument("MatchingOptions: " + *problem);
+  }
+  Matches result;
+  result.frame_i = features_i.frame;
+  result.frame_j = features_j.frame;
+  std::vector<std::optional<Eigen::Vector2d>> predicted_px;
+  for (const Eigen::Vector3d& bearing : features_i.bearings) {
+    predicted_px.push_back(camera.Project(predicted_j_from_i * bearing));
+  }
+  const KeypointGrid grid_j(features_j);
+  const struct {
+    SearchRange range;
+    double radius;
+  } searches[] = {{SearchRange::kGuided, options.radius_px},
+                  {SearchRange::kWide, options.wide_radius_px},
+                  {SearchRange::kWholeImage, 1e6}};
+  std::vector<Candidate> best;
+  for (const auto& search : searches) {
+    if (search.range == SearchRange::kWholeImage) {
+      // The prediction has failed, so features that it sends out of the image count as well.
+      for (std::size_t i = 0; i < predicted_px.size(); ++i)
+        predicted_px[i] = features_i.keypoints_px[i];
+    }
+    result.range = search.range;
+    best = FindBest(features_i, features_j, predicted_px, grid_j, search.radius, options);
+    KeepMutual(best, features_j.size());
+    KeepCommonTurn(best, features_i, features_j);
+    const auto found =
+        std::count_if(best.begin(), best.end(), [](const Candidate& c) { return c.j >= 0; });
+    if (found >= options.min_matches) break;
+  }
+  for (int i = 0; i < features_i.size(); ++i) {
+    if (best[i].j < 0) continue;
+    result.matches.push_back(
+        {KeypointIndex{i}, KeypointIndex{best[i].j}, features_j.keypoints_px[best[i].j]});
+  }
+  return result;
+}
+
+Matches RefineMatches(Matches matches,
+                      const Features& features_i,
+                      const Features& features_j,
+                      const std::vector<cv::Mat>& pyramid_i,
+                      const std::vector<cv::Mat>& pyramid_j,
+                      const MatchingOptions& options,
+                      double scale_factor) {
+  if (matches.matches.empty()) return matches;
+  std::vector<cv::Point2f> points_i;
+  std::vector<cv::Point2f> points_j;
+  for (const Match& match : matches.matches) {
+    const Eigen::Vector2d& from = features_i.keypoints_px[match.i.value];
+    points_i.emplace_back(static_cast<float>(from.x()), static_cast<float>(from.y()));
+    points_j.emplace_back(static_cast<float>(match.keypoint_j_px.x()),
+                          static_cast<float>(match.keypoint_j_px.y()));
+  }
+  std::vector<std::uint8_t> found;
+  std::vector<float> unused_error;
+  cv::calcOpticalFlowPyrLK(
+      pyramid_i,
+      pyramid_j,
+      points_i,
+      points_j,
+      found,
+      unused_error,
+      cv::Size(options.patch_px, options.patch_px),
+      options.patch_levels - 1,
+      cv::TermCriteria(cv::TermCriteria::COUNT + cv::TermCriteria::EPS, 20, 0.01),
+      cv::OPTFLOW_USE_INITIAL_FLOW);
+  std::vector<Match> kept;
+  for (std::size_t k = 0; k < matches.matches.size(); ++k) {
+    if (!found[k]) continue;
+    Match match = matches.matches[k];
+    match.keypoint_j_px = Eigen::Vector2d(points_j[k].x, points_j[k].y);
+    const double scale = std::pow(scale_factor, features_j.levels[match.j.value]);
+    const double correction = (match.keypoint_j_px - features_j.keypoints_px[match.j.value]).norm();
+    if (correction <= options.max_correction_px * scale) kept.push_back(match);
+  }
+  matches.matches = std::move(kept);
+  return matches;
+}
+
+}  // namespace rotslam

@@ -1,0 +1,91 @@
+#pragma once
+
+#include <optional>
+#include <string>
+#include <vector>
+
+#include <opencv2/core.hpp>
+
+#include "rotodom/camera/camera.h"
+#include "rotodom/features/features.h"
+#include "rotodom/types/rotation.h"
+
+namespace rotslam {
+
+struct MatchingOptions {
+  // Search radius around the position that the predicted rotation gives, for neighbouring frames;
+  // it has room for the flow of the translation. Widened when too few matches are found.
+  double radius_px = 40.0;
+  double wide_radius_px = 150.0;
+  // Fewer matches than this in the small radius call for the wide one, and then for the whole
+  // image.
+  int min_matches = 150;
+  // Largest Hamming distance of 256 bits; 64 is far outside what equal patches show under noise.
+  int max_distance = 64;
+  // The best candidate must be better than the second, if that lies elsewhere, by this ratio.
+  double ratio = 0.85;
+  // Pyramid levels that a feature may move between two frames.
+  int max_level_step = 1;
+  // Patch side, pyramid levels and largest correction of the sub-pixel refinement; the correction
+  // is in pixels of the feature's own level.
+  int patch_px = 11;
+  int patch_levels = 2;
+  double max_correction_px = 3.0;
+
+  std::optional<std::string> Problem() const;
+
+  template <class Visitor>
+  void Visit(Visitor&& visit) {
+    visit("radius_px", radius_px);
+    visit("wide_radius_px", wide_radius_px);
+    visit("min_matches", min_matches);
+    visit("max_distance", max_distance);
+    visit("ratio", ratio);
+    visit("max_level_step", max_level_step);
+    visit("patch_px", patch_px);
+    visit("patch_levels", patch_levels);
+    visit("max_correction_px", max_correction_px);
+  }
+};
+
+/// The same corner in two frames: positions in their `Features`, and where frame j shows the patch
+/// that frame i has at its keypoint, to a fraction of a pixel.
+struct Match {
+  KeypointIndex i;
+  KeypointIndex j;
+  Eigen::Vector2d keypoint_j_px;
+};
+
+enum class SearchRange { kGuided, kWide, kWholeImage };
+
+struct Matches {
+  FrameId frame_i;
+  FrameId frame_j;
+  std::vector<Match> matches;                // ascending in i; each keypoint at most once
+  SearchRange range = SearchRange::kGuided;  // how far the search had to go
+};
+
+/// Image pyramid for RefineMatches, as cv::calcOpticalFlowPyrLK takes it.
+std::vector<cv::Mat> BuildPatchPyramid(const cv::Mat& grey, const MatchingOptions& options);
+
+/// Matches two frames' descriptors around the positions that the predicted rotation gives: mutual
+/// best, ratio test, agreement of the patch orientations; wider only where too few are found. Cost:
+/// proportional to n_i times the number of features in the search circle.
+Matches MatchFeatures(const Features& features_i,
+                      const Features& features_j,
+                      const Rotation& predicted_j_from_i,
+                      const Camera& camera,
+                      const MatchingOptions& options);
+
+/// Sharpens `matches` by aligning the patch around each keypoint of frame i with frame j
+/// (Lucas-Kanade), and drops those that cannot be aligned or move by more than
+/// options.max_correction_px.
+Matches RefineMatches(Matches matches,
+                      const Features& features_i,
+                      const Features& features_j,
+                      const std::vector<cv::Mat>& pyramid_i,
+                      const std::vector<cv::Mat>& pyramid_j,
+                      const MatchingOptions& options,
+                      double scale_factor);
+
+}  // namespace rotslam

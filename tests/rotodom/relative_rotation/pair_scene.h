@@ -1,0 +1,67 @@
+#pragma once
+
+#include <cmath>
+#include <cstdint>
+#include <random>
+#include <vector>
+
+#include "rotodom/relative_rotation/relative_rotation.h"
+
+namespace rotslam {
+
+/// Two views of random points, with truth.
+struct PairSceneOptions {
+  int num_pairs = 500;
+  double baseline_over_depth = 0.1;
+  double noise_px = 0.5;
+  double outlier_ratio = 0.0;
+  double rotation_deg = 3.0;
+  std::uint64_t seed = 1;
+};
+
+struct PairScene {
+  std::vector<BearingPair> pairs;
+  Rotation j_from_i;
+  Eigen::Vector3d translation_direction;
+};
+
+constexpr double kPairFocalPx = 700.0;
+
+inline PairScene MakePairScene(const PairSceneOptions& options) {
+  std::mt19937_64 random(options.seed);
+  std::uniform_real_distribution<double> uniform(-1.0, 1.0);
+  std::normal_distribution<double> normal;
+  const auto random_direction = [&] {
+    return Eigen::Vector3d(normal(random), normal(random), normal(random)).normalized();
+  };
+  const double sigma = options.noise_px / kPairFocalPx;
+  const auto noisy = [&](const Eigen::Vector3d& point) {
+    const Eigen::Vector3d image(point.x() / point.z() + sigma * normal(random),
+                                point.y() / point.z() + sigma * normal(random),
+                                1.0);
+    return Eigen::Vector3d(image.normalized());
+  };
+  PairScene scene;
+  scene.j_from_i = Rotation::Exp(options.rotation_deg * kRadFromDeg * random_direction());
+  scene.translation_direction = random_direction();
+  const double mean_depth = 10.0;
+  const Eigen::Vector3d translation =
+      options.baseline_over_depth * mean_depth * scene.translation_direction;
+  while (static_cast<int>(scene.pairs.size()) < options.num_pairs) {
+    // 640 x 480 at the focal length above; depths 5 to 15.
+    const double depth = mean_depth + 5.0 * uniform(random);
+    const Eigen::Vector3d point_i(
+        0.457 * uniform(random) * depth, 0.343 * uniform(random) * depth, depth);
+    const Eigen::Vector3d point_j = scene.j_from_i * point_i + translation;
+    if (point_j.z() < 1.0) continue;
+    BearingPair pair{noisy(point_i), noisy(point_j)};
+    if (0.5 * (uniform(random) + 1.0) < options.outlier_ratio) {
+      pair.bearing_j =
+          Eigen::Vector3d(0.457 * uniform(random), 0.343 * uniform(random), 1.0).normalized();
+    }
+    scene.pairs.push_back(pair);
+  }
+  return scene;
+}
+
+}  // namespace rotslam
