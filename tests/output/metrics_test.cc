@@ -114,6 +114,19 @@ TEST(Metrics, MeasureTheAteOfAKnownError) {
   EXPECT_NEAR(metrics.ate_m.value(), std::sqrt(2.0 - scale * 2.0), 1e-12);
 }
 
+// A mirror image is no similarity: the best one collapses what the mirror swapped.
+TEST(Metrics, DoNotMirrorTheEstimate) {
+  Trajectory truth;
+  Trajectory mirrored;
+  for (int k = 0; k < 8; ++k) {
+    const Eigen::Vector3d corner(k & 1 ? 3.0 : -3.0, k & 2 ? 2.0 : -2.0, k & 4 ? 1.0 : -1.0);
+    truth.push_back({1.0 * k, {}, corner + Eigen::Vector3d(k == 7, 0.0, 0.0)});
+    mirrored.push_back(truth.back());
+    mirrored.back().center_in_world.y() *= -1.0;
+  }
+  EXPECT_GT(Compare(truth, mirrored).ate_m.value(), 1.0);
+}
+
 TEST(Metrics, HaveNoAteWithoutMotion) {
   Trajectory still = Circle(5);
   for (StampedPose& pose : still) pose.center_in_world.setConstant(3.0);
@@ -139,13 +152,14 @@ TEST(AssociatePoses, InterpolatesBetweenNeighboursOnly) {
   Trajectory truth = Circle(4);  // 0, 0.1, 0.2, 0.3 s
   truth[3].timestamp_s = 0.7;    // a gap of 0.5 s
   const Rotation identity;
-  const Trajectory estimate = {{-0.05, identity, {}},     // before the first
-                               {-0.00005, identity, {}},  // within exact_s of the first
-                               {0.025, identity, {}},     // a quarter of the way
-                               {0.2, identity, {}},       // exactly there
-                               {0.4, identity, {}},       // in the gap
-                               {0.70009, identity, {}},   // within exact_s of the last
-                               {0.8, identity, {}}};      // after the last
+  const Trajectory estimate = {
+      {-0.05, identity, Eigen::Vector3d::Zero()},     // before the first
+      {-0.00005, identity, Eigen::Vector3d::Zero()},  // within exact_s of the first
+      {0.025, identity, Eigen::Vector3d::Zero()},     // a quarter of the way
+      {0.2, identity, Eigen::Vector3d::Zero()},       // exactly there
+      {0.4, identity, Eigen::Vector3d::Zero()},       // in the gap
+      {0.70009, identity, Eigen::Vector3d::Zero()},   // within exact_s of the last
+      {0.8, identity, Eigen::Vector3d::Zero()}};      // after the last
   const std::vector<PosePair> pairs = AssociatePoses(truth, estimate, {});
   ASSERT_EQ(pairs.size(), 4u);
   EXPECT_EQ(pairs[0].ground_truth.center_in_world, truth[0].center_in_world);

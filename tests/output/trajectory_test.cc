@@ -46,6 +46,12 @@ TEST(Trajectory, ComesBackFromTum) {
   }
 }
 
+TEST(Trajectory, KeepsNanoseconds) {
+  const TemporaryFolder folder;
+  WriteTumTrajectory(folder.path() / "t.txt", {{123.456789012, {}, Eigen::Vector3d::Zero()}});
+  EXPECT_EQ(ReadTrajectory(folder.path() / "t.txt")[0].timestamp_s, 123.456789012);
+}
+
 TEST(Trajectory, ComesBackFromKittiWithItsTimes) {
   const TemporaryFolder folder;
   const Trajectory written = RandomTrajectory(3);
