@@ -8,6 +8,7 @@ int main(int argc, char** argv) {
                "rotslam");
   app.require_subcommand(1);
   rotslam::Action action;
+  rotslam::AddSimulateCommand(app, action);
   CLI11_PARSE(app, argc, argv);
   try {
     return action();
