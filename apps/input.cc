@@ -19,11 +19,13 @@ void AddInputFlags(CLI::App& command, InputFlags& flags) {
                   flags.sequence,
                   "Image folder, KITTI odometry, TUM RGB-D or EuRoC sequence, or video file")
       ->required();
-  command.add_option("--camera",
-                     flags.camera,
-                     "Calibration: our YAML, ORB-SLAM, Kalibr, KITTI, EuRoC or COLMAP; not needed where "
-                     "it lies with the images");
-  command.add_option("--out", flags.out, "Folder for the results, made if it is not there")->required();
+  command.add_option(
+      "--camera",
+      flags.camera,
+      "Calibration: our YAML, ORB-SLAM, Kalibr, KITTI, EuRoC or COLMAP; not needed where "
+      "it lies with the images");
+  command.add_option("--out", flags.out, "Folder for the results, made if it is not there")
+      ->required();
   command.add_option("--first", flags.first, "First input frame to use");
   command.add_option("--last", flags.last, "Last input frame to use; -1: to the end");
   command.add_option("--stride", flags.stride, "Use every n-th frame");
@@ -41,7 +43,8 @@ Input OpenInput(const InputFlags& flags,
   } else if (const auto& file = input.sequence->CameraFile()) {
     input.camera_file = file->string();
   } else {
-    throw std::runtime_error(flags.sequence + ": no calibration lies with the images; give one with --camera FILE");
+    throw std::runtime_error(flags.sequence +
+                             ": no calibration lies with the images; give one with --camera FILE");
   }
   input.camera = MatchToImages(ReadCamera(input.camera_file), input.sequence->image_size());
   tell("camera: " + Describe(input.camera) + " (" + input.camera_file + ")");

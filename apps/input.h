@@ -31,8 +31,8 @@ struct Input {
   std::string camera_file;
 };
 
-/// Opens the sequence, reads its camera (`flags.camera`, else what lies with the images) and says what was understood
-/// through `tell`. Throws std::runtime_error with one clear line.
+/// Opens the sequence, reads its camera (`flags.camera`, else what lies with the images) and says
+/// what was understood through `tell`. Throws std::runtime_error with one clear line.
 Input OpenInput(const InputFlags& flags,
                 const SequenceOptions& options,
                 const std::function<void(const std::string&)>& tell);

@@ -41,7 +41,8 @@ Orientations FindOrientations(Input& input,
   progress.StartStage("orientations", input.sequence->NumFrames());
   while (const std::optional<Frame> frame = input.sequence->Next()) {
     if (frame->image.empty()) {
-      progress.Warn("frame " + std::to_string(frame->id.value) + " skipped, its pose is interpolated: " + frame->problem);
+      progress.Warn("frame " + std::to_string(frame->id.value) +
+                    " skipped, its pose is interpolated: " + frame->problem);
       ++orientations.num_unreadable;
     }
     const FrameReport report = odometry.AddFrame(frame->id, frame->timestamp_s, frame->image);
@@ -56,19 +57,21 @@ Orientations FindOrientations(Input& input,
 
   const int num_frames = static_cast<int>(orientations.timestamps_s.size());
   if (num_frames < 3) {
-    throw std::runtime_error("only " + std::to_string(num_frames) + " frames could be read; at least 3 are needed");
+    throw std::runtime_error("only " + std::to_string(num_frames) +
+                             " frames could be read; at least 3 are needed");
   }
   if (orientations.graph.edges().empty()) {
-    throw std::runtime_error("no two of the " + std::to_string(num_frames) +
-                             " frames could be matched: the images show too few corners in common; check "
-                             "that they are in focus, exposed and in order");
+    throw std::runtime_error(
+        "no two of the " + std::to_string(num_frames) +
+        " frames could be matched: the images show too few corners in common; check "
+        "that they are in focus, exposed and in order");
   }
   for (const auto& [frame, rotation] : orientations.cam_from_world) {
     orientations.num_predicted += orientations.graph.EdgesOf(frame).empty();
   }
   InterpolateUnconnected(orientations);
-  progress.EndStage(std::to_string(num_frames) + " frames, " + std::to_string(orientations.graph.edges().size()) +
-                    " edges");
+  progress.EndStage(std::to_string(num_frames) + " frames, " +
+                    std::to_string(orientations.graph.edges().size()) + " edges");
   if (orientations.num_predicted > 0) {
     progress.Warn(std::to_string(orientations.num_predicted) +
                   " frames match no other; their orientations are interpolated");
@@ -79,8 +82,9 @@ Orientations FindOrientations(Input& input,
 Trajectory RotationTrajectory(const Orientations& orientations) {
   Trajectory trajectory;
   for (const auto& [frame, cam_from_world] : orientations.cam_from_world) {
-    trajectory.push_back(
-        {orientations.timestamps_s[frame.value], cam_from_world.Inverse(), Eigen::Vector3d::Zero()});
+    trajectory.push_back({orientations.timestamps_s[frame.value],
+                          cam_from_world.Inverse(),
+                          Eigen::Vector3d::Zero()});
   }
   return trajectory;
 }

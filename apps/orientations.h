@@ -21,9 +21,9 @@ struct Orientations {
   int num_weak = 0;
 };
 
-/// Reads the sequence to its end and finds every frame's orientation. Frames that could not be matched get theirs
-/// by interpolation in time between the nearest frames that could.
-/// Throws std::runtime_error when there are fewer than three frames or no two of them match.
+/// Reads the sequence to its end and finds every frame's orientation. Frames that could not be
+/// matched get theirs by interpolation in time between the nearest frames that could. Throws
+/// std::runtime_error when there are fewer than three frames or no two of them match.
 Orientations FindOrientations(Input& input,
                               const OdometryOptions& options,
                               const CommonFlags& flags,

@@ -1,9 +1,9 @@
 #include "apps/progress.h"
 
-#include <unistd.h>
-
 #include <algorithm>
 #include <cstdio>
+
+#include <unistd.h>
 
 namespace rotslam {
 namespace {
@@ -58,7 +58,8 @@ void Progress::EndStage(const std::string& note) {
   ClearLine();
   char seconds[32];
   std::snprintf(seconds, sizeof(seconds), "%.1f s", SecondsSince(started_));
-  std::fprintf(stderr, "%s: %s%s%s\n", stage_.c_str(), note.c_str(), note.empty() ? "" : ", ", seconds);
+  std::fprintf(
+      stderr, "%s: %s%s%s\n", stage_.c_str(), note.c_str(), note.empty() ? "" : ", ", seconds);
 }
 
 std::string Progress::Figures(int done) const {
@@ -67,7 +68,8 @@ std::string Progress::Figures(int done) const {
   const double fps = done / seconds;
   if (total_ > 0 && fps > 0.0) {
     const int eta = static_cast<int>((total_ - done) / fps + 0.5);
-    std::snprintf(text, sizeof(text), "%d/%d  %.1f fps  ETA %d:%02d", done, total_, fps, eta / 60, eta % 60);
+    std::snprintf(
+        text, sizeof(text), "%d/%d  %.1f fps  ETA %d:%02d", done, total_, fps, eta / 60, eta % 60);
   } else {
     std::snprintf(text, sizeof(text), "%d  %.1f fps", done, fps);
   }

@@ -5,8 +5,8 @@
 
 namespace rotslam {
 
-/// Tells a person how a run is getting on: one line that renews itself on a terminal, a plain line now and then
-/// elsewhere. Writes to standard error; warnings are shown even when quiet.
+/// Tells a person how a run is getting on: one line that renews itself on a terminal, a plain line
+/// now and then elsewhere. Writes to standard error; warnings are shown even when quiet.
 class Progress {
  public:
   explicit Progress(bool quiet);

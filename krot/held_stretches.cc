@@ -5,8 +5,8 @@
 namespace rotslam {
 namespace {
 
-// Of the edges across the step from frame n-1 to frame n: the span of the longest, and how many of that span there
-// are and show no baseline.
+// Of the edges across the step from frame n-1 to frame n: the span of the longest, and how many of
+// that span there are and show no baseline.
 struct Evidence {
   int span = 0;
   int edges = 0;
@@ -35,7 +35,8 @@ std::optional<std::string> HeldStretchOptions::Problem() const {
 std::vector<HeldStretch> FindHeldStretches(const ViewGraph& graph,
                                            const RotationMap& cam_from_world,
                                            const HeldStretchOptions& options) {
-  if (const auto problem = options.Problem()) throw std::invalid_argument("HeldStretchOptions: " + *problem);
+  if (const auto problem = options.Problem())
+    throw std::invalid_argument("HeldStretchOptions: " + *problem);
   if (!options.enabled || cam_from_world.empty()) return {};
   std::vector<FrameId> frames;
   std::map<FrameId, int> position;
@@ -55,7 +56,8 @@ std::vector<HeldStretch> FindHeldStretches(const ViewGraph& graph,
     if (steps[n].Ratio() < options.min_rotation_only_ratio) continue;
     const int first = n - 1;
     double sum = 0.0;
-    while (n < count && steps[n].Ratio() >= options.min_rotation_only_ratio) sum += steps[n++].Ratio();
+    while (n < count && steps[n].Ratio() >= options.min_rotation_only_ratio)
+      sum += steps[n++].Ratio();
     const int last = n - 1;
     if (last - first + 1 >= options.min_frames) {
       stretches.push_back({frames[first], frames[last], sum / (last - first)});

@@ -13,8 +13,8 @@ namespace rotslam {
 struct HeldStretchOptions {
   // Holding can be switched off, to see what it is good for.
   bool enabled = true;
-  // A step from one frame to the next is held when at least this share of the longest edges across it are
-  // rotation-only; a slow camera shows its baseline in those first.
+  // A step from one frame to the next is held when at least this share of the longest edges across
+  // it are rotation-only; a slow camera shows its baseline in those first.
   double min_rotation_only_ratio = 0.5;
   // Shorter runs than this, in frames, are left alone: a hand-held camera pauses that long.
   int min_frames = 8;

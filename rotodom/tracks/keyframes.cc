@@ -13,7 +13,8 @@ struct Ray {
   Eigen::Vector3d direction;  // in the world's axes
 };
 
-std::map<FrameId, std::vector<Ray>> RaysOfFrames(const RotationMap& cam_from_world, const std::vector<Track>& tracks) {
+std::map<FrameId, std::vector<Ray>> RaysOfFrames(const RotationMap& cam_from_world,
+                                                 const std::vector<Track>& tracks) {
   std::map<FrameId, std::vector<Ray>> rays;
   for (int k = 0; k < static_cast<int>(tracks.size()); ++k) {
     for (const Observation& observation : tracks[k].observations) {
@@ -54,7 +55,8 @@ std::optional<std::string> KeyframeOptions::Problem() const {
     return "min_parallax_deg = " + std::to_string(min_parallax_deg) + ": must be positive";
   }
   if (!(min_shared_ratio >= 0.0 && min_shared_ratio < 1.0)) {
-    return "min_shared_ratio = " + std::to_string(min_shared_ratio) + ": must be 0 or more and below 1";
+    return "min_shared_ratio = " + std::to_string(min_shared_ratio) +
+           ": must be 0 or more and below 1";
   }
   return std::nullopt;
 }
@@ -63,7 +65,8 @@ std::set<FrameId> SelectKeyframes(const RotationMap& cam_from_world,
                                   const std::vector<Track>& tracks,
                                   const std::vector<HeldStretch>& held,
                                   const KeyframeOptions& options) {
-  if (const auto problem = options.Problem()) throw std::invalid_argument("KeyframeOptions: " + *problem);
+  if (const auto problem = options.Problem())
+    throw std::invalid_argument("KeyframeOptions: " + *problem);
   std::set<FrameId> keyframes;
   if (cam_from_world.empty()) return keyframes;
   const auto rays_of = RaysOfFrames(cam_from_world, tracks);
@@ -80,9 +83,10 @@ std::set<FrameId> SelectKeyframes(const RotationMap& cam_from_world,
     keyframe = frame;
   };
   for (const auto& [frame, rotation] : cam_from_world) {
-    const auto stretch = std::find_if(held.begin(), held.end(), [&, f = frame](const HeldStretch& s) {
-      return s.first <= f && f <= s.last;
-    });
+    const auto stretch =
+        std::find_if(held.begin(), held.end(), [&, f = frame](const HeldStretch& s) {
+          return s.first <= f && f <= s.last;
+        });
     if (stretch != held.end()) {
       if (frame == stretch->first || frame == stretch->last) take(frame);
       before = frame;
@@ -105,13 +109,17 @@ std::set<FrameId> SelectKeyframes(const RotationMap& cam_from_world,
   return keyframes;
 }
 
-std::vector<Track> RestrictTracks(const std::vector<Track>& tracks, const std::set<FrameId>& frames, int min_length) {
+std::vector<Track> RestrictTracks(const std::vector<Track>& tracks,
+                                  const std::set<FrameId>& frames,
+                                  int min_length) {
   std::vector<Track> restricted;
   for (const Track& track : tracks) {
     Track kept = track;
-    std::erase_if(kept.observations,
-                  [&](const Observation& observation) { return !frames.contains(observation.frame); });
-    if (static_cast<int>(kept.observations.size()) >= min_length) restricted.push_back(std::move(kept));
+    std::erase_if(kept.observations, [&](const Observation& observation) {
+      return !frames.contains(observation.frame);
+    });
+    if (static_cast<int>(kept.observations.size()) >= min_length)
+      restricted.push_back(std::move(kept));
   }
   return restricted;
 }
