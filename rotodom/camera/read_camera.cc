@@ -62,8 +62,8 @@ int PixelCount(const fs::path& file, const std::string& key, const std::string& 
 // A map of a YAML file, with the place it has there, so that what is wrong can be named.
 class Section {
  public:
-  Section(fs::path file, YAML::Node node, std::string prefix)
-      : file_(std::move(file)), node_(std::move(node)), prefix_(std::move(prefix)) {}
+  Section(fs::path file, const YAML::Node& node, std::string prefix)
+      : file_(std::move(file)), node_(node), prefix_(std::move(prefix)) {}
 
   const fs::path& file() const { return file_; }
   std::string FullKey(const std::string& key) const { return prefix_ + key; }
@@ -328,7 +328,7 @@ Camera ReadColmapLine(const fs::path& file, const std::vector<std::string>& word
   if (found == models.end()) {
     std::string known;
     for (const ColmapModel& model : models) {
-      known += (known.empty() ? "" : ", ") + std::string(model.name);
+      known.append(known.empty() ? "" : ", ").append(model.name);
     }
     Fail(file, who + "model is '" + words[1] + "', must be one of " + known);
   }
@@ -386,9 +386,8 @@ bool IsColmapLine(const std::vector<std::string>& words) {
          all(words[1], "ABCDEFGHIJKLMNOPQRSTUVWXYZ_0123456789") && all(words[2], "0123456789");
 }
 
-Camera ReadYaml(const fs::path& file, std::string text) {
-  // OpenCV's first line, "%YAML:1.0", is no directive that YAML knows.
-  if (text.rfind("%YAML:", 0) == 0) text.insert(0, "#");
+// OpenCV's first line, "%YAML:1.0", is a directive without a meaning to yaml-cpp, which skips it.
+Camera ReadYaml(const fs::path& file, const std::string& text) {
   YAML::Node root;
   try {
     root = YAML::Load(text);

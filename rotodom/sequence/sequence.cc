@@ -40,11 +40,14 @@ cv::Mat ToEightBits(cv::Mat image, std::string& problem) {
   return {};
 }
 
-// A JPEG file that ends before its end marker decodes to grey below the break.
+// A JPEG file that ends before its end marker decodes to grey below the break. The marker must come
+// behind the start of the last scan: a thumbnail in the header has markers of its own.
 bool IsCutOffJpeg(const std::vector<unsigned char>& bytes) {
   if (bytes.size() < 4 || bytes[0] != 0xff || bytes[1] != 0xd8) return false;
-  const unsigned char kEnd[] = {0xff, 0xd9};
-  return std::find_end(bytes.begin(), bytes.end(), std::begin(kEnd), std::end(kEnd)) == bytes.end();
+  constexpr unsigned char kScan[] = {0xff, 0xda};
+  constexpr unsigned char kEnd[] = {0xff, 0xd9};
+  const auto scan = std::find_end(bytes.begin(), bytes.end(), std::begin(kScan), std::end(kScan));
+  return std::search(scan, bytes.end(), std::begin(kEnd), std::end(kEnd)) == bytes.end();
 }
 
 cv::Mat DecodeImage(const fs::path& file, std::string& problem) {
