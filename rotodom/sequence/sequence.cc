@@ -4,6 +4,8 @@
 #include <cmath>
 #include <cstdint>
 #include <fstream>
+#include <functional>
+#include <future>
 #include <iomanip>
 #include <iterator>
 #include <sstream>
@@ -116,6 +118,17 @@ class FileSequence : public Sequence {
   }
 
  private:
+  struct Decoded {
+    cv::Mat image;
+    std::string problem;
+  };
+
+  static Decoded DecodeEntry(const ImageEntry& entry) {
+    Decoded decoded;
+    decoded.image = DecodeImage(entry.file, decoded.problem);
+    return decoded;
+  }
+
   void FindImageSize() {
     std::string first_problem;
     for (const ImageEntry& entry : entries_) {
@@ -139,12 +152,18 @@ class FileSequence : public Sequence {
     frame.id = FrameId{next_++};
     frame.timestamp_s = entry.timestamp_s;
     frame.name = entry.file.filename().string();
-    frame.image = DecodeImage(entry.file, frame.problem);
+    Decoded decoded = ahead_.valid() ? ahead_.get() : DecodeEntry(entry);
+    if (next_ < num_frames_) {
+      ahead_ = std::async(std::launch::async, DecodeEntry, std::cref(entries_[next_]));
+    }
+    frame.image = std::move(decoded.image);
+    frame.problem = std::move(decoded.problem);
     return frame;
   }
 
   std::vector<ImageEntry> entries_;
   int next_ = 0;
+  std::future<Decoded> ahead_;  // image next_, decoded while the caller works on the one before
 };
 
 // FFmpeg where OpenCV has it: with any other back end allowed, a file that is no video makes each
