@@ -345,7 +345,7 @@ Camera ReadColmapLine(const fs::path& file, const std::vector<std::string>& word
   for (std::size_t k = 0; k < num_given; ++k) {
     const std::string& name = found->parameters[k];
     const std::string& text = words[4 + k];
-    const std::string key = who + (name == "0" ? "k" + std::to_string(k - 5) : name);
+    std::string key = who + (name == "0" ? "k" + std::to_string(k - 5) : name);
     const double value = FiniteNumber(file, key, text);
     if (name == "f") camera.fx = camera.fy = PositiveNumber(file, key, text);
     if (name == "fx") camera.fx = PositiveNumber(file, key, text);
@@ -359,7 +359,8 @@ Camera ReadColmapLine(const fs::path& file, const std::vector<std::string>& word
     if (name == "k3") camera.distortion[camera.model == CameraModel::kRadtan ? 4 : 2] = value;
     if (name == "k4") camera.distortion[3] = value;
     if (name == "0" && value != 0.0) {
-      Fail(file, key + " is " + text + ", but a denominator of the distortion is not supported");
+      key.append(" is ").append(text);
+      Fail(file, key.append(", but a denominator of the distortion is not supported"));
     }
   }
   camera.model = WithoutEmptyDistortion(camera);
@@ -467,7 +468,8 @@ std::string CameraYaml(const Camera& camera) {
                                                                    : 4;
   text += "distortion: [";
   for (std::size_t k = 0; k < count; ++k) {
-    text += (k == 0 ? "" : ", ") + NumberText(camera.distortion[k]);
+    if (k > 0) text += ", ";
+    text += NumberText(camera.distortion[k]);
   }
   return text + "]\n";
 }
