@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstdint>
 #include <fstream>
 #include <iomanip>
 #include <iterator>
@@ -13,6 +14,7 @@
 #include <opencv2/imgcodecs.hpp>
 #include <opencv2/imgproc.hpp>
 #include <opencv2/videoio.hpp>
+#include <opencv2/videoio/registry.hpp>
 
 #include "rotodom/sequence/layout.h"
 
@@ -99,7 +101,8 @@ class FileSequence : public Sequence {
     ground_truth_file_ = std::move(layout.ground_truth_file);
     const int num_entries = static_cast<int>(layout.entries.size());
     if (options.first >= num_entries) FailBeyondEnd(place_, options.first, num_entries);
-    const int end = options.last < 0 ? num_entries : std::min(options.last + 1, num_entries);
+    const bool to_the_end = options.last < 0 || options.last >= num_entries;
+    const int end = to_the_end ? num_entries : options.last + 1;
     for (std::int64_t k = options.first; k < end; k += options.stride) {
       entries_.push_back(std::move(layout.entries[static_cast<std::size_t>(k)]));
       timestamps_s_.push_back(entries_.back().timestamp_s);
@@ -141,6 +144,12 @@ class FileSequence : public Sequence {
   int next_ = 0;
 };
 
+// FFmpeg where OpenCV has it: with any other back end allowed, a file that is no video makes each
+// of them complain on stderr in turn.
+int VideoBackEnd() {
+  return cv::videoio_registry::hasBackend(cv::CAP_FFMPEG) ? cv::CAP_FFMPEG : cv::CAP_ANY;
+}
+
 class VideoSequence : public Sequence {
  public:
   VideoSequence(Layout layout, const SequenceOptions& options) : options_(options) {
@@ -148,15 +157,15 @@ class VideoSequence : public Sequence {
     place_ = std::move(layout.folder);
     camera_file_ = std::move(layout.camera_file);
     Probe();
-    capture_.open(place_.string());
-    while (number_ < options.first) {
+    capture_.open(place_.string(), VideoBackEnd());
+    while (number_ <= options.first) {
       if (!Grab()) FailBeyondEnd(place_, options.first, number_);
     }
     const double claimed = capture_.get(cv::CAP_PROP_FRAME_COUNT);
     if (claimed > 0.0 && claimed < 1e9) {
-      int end = static_cast<int>(claimed);
-      if (options.last >= 0) end = std::min(end, options.last + 1);
-      num_frames_ = std::max(0, (end - options.first + options.stride - 1) / options.stride);
+      int last = static_cast<int>(claimed) - 1;
+      if (options.last >= 0) last = std::min(last, options.last);
+      num_frames_ = std::max(0, last - options.first) / options.stride + 1;
     }
   }
 
@@ -164,7 +173,7 @@ class VideoSequence : public Sequence {
   // Reads the first frames once: is there a picture, and do their timestamps increase?
   void Probe() {
     constexpr int kProbedFrames = 10;
-    cv::VideoCapture capture(place_.string());
+    cv::VideoCapture capture(place_.string(), VideoBackEnd());
     if (!capture.isOpened()) {
       throw std::runtime_error(place_.string() + ": not a video that OpenCV can open");
     }
@@ -194,11 +203,17 @@ class VideoSequence : public Sequence {
     return true;
   }
 
+  // Steps to the next frame to give; false after the last. The first one is there from the start.
+  bool Advance() {
+    if (timestamps_s_.empty()) return true;
+    const bool beyond_last = options_.last >= 0 && number_ - 1 > options_.last - options_.stride;
+    if (ended_ || beyond_last) return false;
+    for (int k = 0; k < options_.stride && !ended_; ++k) ended_ = !Grab();
+    return !ended_;
+  }
+
   std::optional<Frame> Decode() override {
-    const int num_skipped = timestamps_s_.empty() ? 0 : options_.stride - 1;
-    bool there = options_.last < 0 || number_ + num_skipped <= options_.last;
-    for (int k = 0; k <= num_skipped && there; ++k) there = Grab();
-    if (!there) {
+    if (!Advance()) {
       num_frames_ = static_cast<int>(timestamps_s_.size());
       return std::nullopt;
     }
@@ -222,6 +237,7 @@ class VideoSequence : public Sequence {
   SequenceOptions options_;
   cv::VideoCapture capture_;
   bool has_timestamps_ = true;
+  bool ended_ = false;
   int number_ = 0;       // frames of the file grabbed so far
   double time_s_ = 0.0;  // of the frame grabbed last
 };
