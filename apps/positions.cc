@@ -274,7 +274,9 @@ PositionResult FindPositions(const Orientations& orientations,
   RotationMap keyframe_rotations;
   for (const FrameId frame : result.keyframes)
     keyframe_rotations[frame] = result.cam_from_world.at(frame);
-  result.krot = SolveKnownRotation(keyframe_rotations, tracks, camera, options.krot);
+  KrotOptions krot_options = options.krot;
+  krot_options.num_threads = num_threads;
+  result.krot = SolveKnownRotation(keyframe_rotations, tracks, camera, krot_options);
   progress.EndStage(result.krot.message);
   if (!result.krot.Usable()) return WithoutMap(std::move(result), result.krot.message);
 

@@ -143,7 +143,7 @@ void AddPositions(const PositionResult& positions, const Camera& camera, RunSumm
   summary.segments = Segments(positions);
 
   SummaryKrot krot;
-  krot.status = Name(positions.krot.status);
+  krot.status = ToString(positions.krot.status);
   krot.gamma_low = positions.krot.gamma_low;
   krot.gamma_high = positions.krot.gamma_high;
   krot.gamma_low_px = positions.krot.gamma_low * camera.MeanFocal();
