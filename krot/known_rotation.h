@@ -15,15 +15,11 @@
 
 namespace rotslam {
 
-/// Which linear-programming answer gives the positions.
-enum class KrotStart {
-  kL1,         // least sum of misses: forgives outliers, the better start for bundle adjustment
-  kBisection,  // least largest residual of what the L1 start kept
-};
-
 struct KrotOptions {
-  // Which answer gives the positions; the bracket is found either way (see use_bracket).
-  KrotStart start = KrotStart::kL1;
+  // Which answer gives the positions: "l1", the least sum of misses, forgives outliers and is the
+  // better start for bundle adjustment; "bisection", the least largest residual of what l1 kept.
+  // The bracket is found either way (see use_bracket).
+  std::string start = "l1";
   // Image bound of the L1 start: observations within it cost nothing. It must cover feature noise
   // and rotation error together: 0.3 deg moves a point by 3.7 px at f = 700.
   double threshold_px = 4.0;
