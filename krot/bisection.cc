@@ -2,14 +2,46 @@
 
 #include <cmath>
 #include <stdexcept>
+#include <utility>
+#include <vector>
 
 namespace rotslam {
 namespace {
 
-// Where to try next inside (low, high): the middle, in ratio once both ends are known, and off the
-// middle after an undecided answer, each time by another fraction.
-double NextGamma(const BisectionResult& bracket, int undecided_in_a_row) {
+// The slack the infeasible programs needed, nearly linear in gamma close to the optimum.
+struct Miss {
+  double gamma;
+  double slack;
+};
+
+// Where the slack of the last two misses runs out, when that lies inside the bracket.
+std::optional<double> PredictOptimum(const BisectionResult& bracket,
+                                     const std::vector<Miss>& misses) {
+  if (misses.size() < 2) return std::nullopt;
+  const Miss& a = misses[misses.size() - 2];
+  const Miss& b = misses.back();
+  if (!(a.slack > b.slack) || !(b.gamma > a.gamma)) return std::nullopt;
+  const double optimum = b.gamma + b.slack * (b.gamma - a.gamma) / (a.slack - b.slack);
+  if (!(optimum > bracket.gamma_low) || !(optimum < bracket.gamma_high)) return std::nullopt;
+  return optimum;
+}
+
+// Where to try next inside (low, high): just above the predicted optimum, then just below it; the
+// middle without a prediction, in ratio once both ends are known, and off the middle after an
+// undecided answer, each time by another fraction.
+double NextGamma(const BisectionResult& bracket,
+                 const std::vector<Miss>& misses,
+                 int undecided_in_a_row,
+                 double relative_gap) {
   static constexpr double kFractions[] = {0.5, 0.35, 0.65, 0.2, 0.8, 0.1, 0.9};
+  if (undecided_in_a_row == 0) {
+    if (const auto optimum = PredictOptimum(bracket, misses)) {
+      const double above = *optimum * (1.0 + 0.4 * relative_gap);
+      const double below = *optimum * (1.0 - 0.4 * relative_gap);
+      if (above < bracket.gamma_high) return above;
+      if (below > bracket.gamma_low) return below;
+    }
+  }
   const double fraction = kFractions[undecided_in_a_row % 7];
   if (bracket.gamma_low <= 0.0) return fraction * bracket.gamma_high;
   return bracket.gamma_low * std::pow(bracket.gamma_high / bracket.gamma_low, fraction);
@@ -64,11 +96,12 @@ BisectionResult MinimiseMaxResidual(const MinimaxProblem& problem,
 
   constexpr int kMaxUndecidedInARow = 7;
   int undecided_in_a_row = 0;
+  std::vector<Miss> misses;
   bracket.status = BisectionStatus::kIterationLimit;
   while (!Narrow(bracket, options)) {
     if (bracket.num_programs >= options.max_programs) return bracket;
     if (undecided_in_a_row >= kMaxUndecidedInARow) return bracket;
-    const double gamma = NextGamma(bracket, undecided_in_a_row);
+    const double gamma = NextGamma(bracket, misses, undecided_in_a_row, options.relative_gap);
     const MinimaxLpResult lp = SolveFeasibility(problem, gamma, options.lp);
     ++bracket.num_programs;
     const double high_before = bracket.gamma_high;
@@ -79,6 +112,7 @@ BisectionResult MinimiseMaxResidual(const MinimaxProblem& problem,
     }
     if (CertifiesInfeasible(problem, gamma, lp.multipliers, options.max_extent)) {
       bracket.gamma_low = gamma;
+      misses.push_back({gamma, lp.objective});
       undecided_in_a_row = 0;
       continue;
     }

@@ -53,7 +53,7 @@ struct BisectionResult {
 /// Finds the structure whose largest residual per image axis is smallest, by bisection over linear
 /// programs.
 /// @param start  a first structure, when there is one: its MaxBoxResidual is the first upper bound.
-/// Cost:    one sparse LP of 5 columns per observation per halving; gap 1e-2 takes 7 to 12.
+/// Cost:    one sparse LP of 5 columns per observation per step; gap 1e-2 takes 6 to 12.
 /// Source:  Kahl & Hartley, Multiple-View Geometry under the L-infinity Norm, PAMI 2008; ours
 /// bounds
 ///          |dx| and |dy| apart, jumps to the recomputed residual of each feasible answer, and

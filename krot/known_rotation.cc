@@ -428,7 +428,12 @@ std::optional<std::string> KrotOptions::Problem() const {
   const auto complain = [](const char* name, double value, const char* limit) {
     return std::string(name) + " is " + std::to_string(value) + ", must be " + limit;
   };
-  if (start != "l1" && start != "bisection") return "start is " + start + ", must be l1 or bisection";
+  if (start != "l1" && start != "bisection") {
+    return "start is '" + start + "', must be l1 or bisection";
+  }
+  if (start == "bisection" && !use_bracket) {
+    return "start is 'bisection', which needs use_bracket";
+  }
   if (!(threshold_px > 0.0)) return complain("threshold_px", threshold_px, "above 0");
   if (!(loose_factor >= 1.0)) return complain("loose_factor", loose_factor, "at least 1");
   if (max_lp_views < 2) return complain("max_lp_views", max_lp_views, "at least 2");

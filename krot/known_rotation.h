@@ -16,9 +16,9 @@
 namespace rotslam {
 
 struct KrotOptions {
-  // Which linear-programming answer gives the positions: "l1", the least sum of misses, forgives
-  // outliers and is the better start for bundle adjustment; "bisection", the least largest residual
-  // of what the L1 start kept. The bracket is found either way (see use_bracket).
+  // Which answer gives the positions: "l1", the least sum of misses, forgives outliers and is the
+  // better start for bundle adjustment; "bisection", the least largest residual of what l1 kept.
+  // The bracket is found either way (see use_bracket).
   std::string start = "l1";
   // Image bound of the L1 start: observations within it cost nothing. It must cover feature noise
   // and rotation error together: 0.3 deg moves a point by 3.7 px at f = 700.
