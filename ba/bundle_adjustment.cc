@@ -647,7 +647,6 @@ void TakeResult(const BundleProblem& problem, const State& state, BundleResult& 
   Reconstruction& out = result.reconstruction;
   out.cam_from_world = problem.start.cam_from_world;
   std::vector<bool> center_seen(state.centers.size(), false);
-  for (const FrameState& frame : state.frames) center_seen[frame.center] = false;
   for (const TrackState& entry : state.tracks) {
     if (entry.kind != TrackKind::kPoint) continue;
     Track track = *entry.track;
