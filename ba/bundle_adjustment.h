@@ -104,7 +104,8 @@ struct BundleResult {
 /// @return  status kTooLittleData for an empty problem or one without parallax; else the gauge of
 /// the start: the first well-observed frame keeps its pose to the last bit and the farthest centre
 /// its distance along the line between them. With `fixed_frames` these keep theirs. Same bytes at
-/// any `options.num_threads`. Error:   truth to 1e-6 of the path length on clean scenes (ba tests).
+/// any `options.num_threads`.
+/// Error:   truth to 1e-6 of the path length on clean scenes (ba tests).
 /// Cost:    per iteration linear in observations plus a Cholesky of 6 unknowns per camera; three
 /// rounds of 67 cameras, 13,000 points and 84,000 observations take 2 s on one core, of 150, 30,000
 /// and 270,000 about 8 s.
