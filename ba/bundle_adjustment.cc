@@ -1,7 +1,6 @@
 #include "ba/bundle_adjustment.h"
 
 #include <algorithm>
-#include <array>
 #include <chrono>
 #include <cmath>
 #include <deque>
@@ -434,12 +433,15 @@ class Minimisation {
         state_(state),
         loss_(MakeLoss(round)),
         problem_(ProblemOptions()),
-        quaternions_(state.frames.size()),
+        camera_blocks_(3 * state.centers.size() + 4 * state.frames.size()),
         frame_used_(state.frames.size(), false),
         center_used_(state.centers.size(), false) {
     for (std::size_t k = 0; k < state.frames.size(); ++k) {
       const Eigen::Vector4d q = state.frames[k].cam_from_world.Quaternion().coeffs();
-      std::copy_n(q.data(), 4, quaternions_[k].begin());
+      std::copy_n(q.data(), 4, QuaternionBlock(k));
+    }
+    for (std::size_t c = 0; c < state.centers.size(); ++c) {
+      std::copy_n(state.centers[c].data(), 3, CenterBlock(c));
     }
     ordering_ = std::make_shared<ceres::ParameterBlockOrdering>();
     AddResiduals();
@@ -465,7 +467,7 @@ class Minimisation {
     options.logging_type = ceres::SILENT;
     ceres::Solver::Summary summary;
     ceres::Solve(options, &problem_, &summary);
-    if (refine_rotations_) TakeRotations();
+    TakeCameras();
     return summary;
   }
 
@@ -477,6 +479,11 @@ class Minimisation {
     options.manifold_ownership = ceres::DO_NOT_TAKE_OWNERSHIP;
     options.disable_all_safety_checks = true;
     return options;
+  }
+
+  double* CenterBlock(std::size_t center) { return &camera_blocks_[3 * center]; }
+  double* QuaternionBlock(std::size_t frame) {
+    return &camera_blocks_[3 * state_.centers.size() + 4 * frame];
   }
 
   void AddResiduals() {
@@ -493,17 +500,17 @@ class Minimisation {
     for (std::size_t k = 0; k < state_.frames.size(); ++k) {
       if (!frame_used_[k]) continue;
       ++counts_.num_frames;
-      problem_.SetManifold(quaternions_[k].data(), &manifold_);
-      ordering_->AddElementToGroup(quaternions_[k].data(), 1);
+      problem_.SetManifold(QuaternionBlock(k), &manifold_);
+      ordering_->AddElementToGroup(QuaternionBlock(k), 1);
     }
     for (std::size_t k = 0; k < state_.centers.size(); ++k) {
-      if (center_used_[k]) ordering_->AddElementToGroup(state_.centers[k].data(), 1);
+      if (center_used_[k]) ordering_->AddElementToGroup(CenterBlock(k), 1);
     }
   }
 
   void AddObservation(TrackState& track, const Sight& sight) {
     const FrameState& frame = state_.frames[sight.frame];
-    double* const quaternion = quaternions_[sight.frame].data();
+    double* const quaternion = QuaternionBlock(sight.frame);
     const Observation& observation = *sight.observation;
     frame_used_[sight.frame] = true;
     if (!frame.fixed) moving_ = true;
@@ -516,11 +523,8 @@ class Minimisation {
     }
     center_used_[frame.center] = true;
     points_.emplace_back(camera_, observation.keypoint_px, observation.sigma_px);
-    problem_.AddResidualBlock(&points_.back(),
-                              loss_.get(),
-                              quaternion,
-                              state_.centers[frame.center].data(),
-                              track.position.data());
+    problem_.AddResidualBlock(
+        &points_.back(), loss_.get(), quaternion, CenterBlock(frame.center), track.position.data());
   }
 
   // Holds fixed frames, or else the first frame that sees points, and the scale where no two held
@@ -531,7 +535,7 @@ class Minimisation {
       const FrameState& frame = state_.frames[k];
       if (frame.fixed) held[frame.center] = true;
       if (frame_used_[k] && (frame.fixed || !refine_rotations_)) {
-        problem_.SetParameterBlockConstant(quaternions_[k].data());
+        problem_.SetParameterBlockConstant(QuaternionBlock(k));
       }
     }
     for (std::size_t c = 0; c < held.size(); ++c) held[c] = held[c] && center_used_[c];
@@ -539,15 +543,15 @@ class Minimisation {
     int num_held = 0;
     for (std::size_t c = 0; c < held.size(); ++c) {
       if (!held[c]) continue;
-      problem_.SetParameterBlockConstant(state_.centers[c].data());
+      problem_.SetParameterBlockConstant(CenterBlock(c));
       if (origin < 0) origin = static_cast<int>(c);
       ++num_held;
     }
     for (std::size_t k = 0; k < state_.frames.size() && origin < 0; ++k) {
       if (!frame_used_[k] || !center_used_[state_.frames[k].center]) continue;
       origin = state_.frames[k].center;
-      problem_.SetParameterBlockConstant(state_.centers[origin].data());
-      problem_.SetParameterBlockConstant(quaternions_[k].data());
+      problem_.SetParameterBlockConstant(CenterBlock(origin));
+      problem_.SetParameterBlockConstant(QuaternionBlock(k));
     }
     if (num_held < 2) AnchorScale(origin);
   }
@@ -564,14 +568,17 @@ class Minimisation {
     if (farthest < 0) return;
     anchor_ = std::make_unique<ScaleAnchorCost>(
         state_.centers[origin], state_.centers[farthest], kScaleAnchorWeight);
-    problem_.AddResidualBlock(anchor_.get(), nullptr, state_.centers[farthest].data());
+    problem_.AddResidualBlock(anchor_.get(), nullptr, CenterBlock(farthest));
   }
 
   // Held rotations keep their last bit.
-  void TakeRotations() {
+  void TakeCameras() {
+    for (std::size_t c = 0; c < state_.centers.size(); ++c) {
+      std::copy_n(CenterBlock(c), 3, state_.centers[c].data());
+    }
     for (std::size_t k = 0; k < state_.frames.size(); ++k) {
-      if (!frame_used_[k] || problem_.IsParameterBlockConstant(quaternions_[k].data())) continue;
-      const Eigen::Quaterniond q(quaternions_[k].data());
+      if (!frame_used_[k] || problem_.IsParameterBlockConstant(QuaternionBlock(k))) continue;
+      const Eigen::Quaterniond q(QuaternionBlock(k));
       if (q.coeffs().allFinite()) state_.frames[k].cam_from_world = Rotation(q);
     }
   }
@@ -585,7 +592,10 @@ class Minimisation {
   std::deque<DirectionCost> directions_;
   std::unique_ptr<ScaleAnchorCost> anchor_;
   ceres::Problem problem_;
-  std::vector<std::array<double, 4>> quaternions_;
+  // Centres, then quaternions, in one piece of memory: Ceres sorts the blocks of a group by
+  // address, and with it the order of elimination, which must not depend on where an allocation
+  // lands.
+  std::vector<double> camera_blocks_;
   std::vector<bool> frame_used_;
   std::vector<bool> center_used_;
   std::shared_ptr<ceres::ParameterBlockOrdering> ordering_;
@@ -647,7 +657,6 @@ void TakeResult(const BundleProblem& problem, const State& state, BundleResult& 
   Reconstruction& out = result.reconstruction;
   out.cam_from_world = problem.start.cam_from_world;
   std::vector<bool> center_seen(state.centers.size(), false);
-  for (const FrameState& frame : state.frames) center_seen[frame.center] = false;
   for (const TrackState& entry : state.tracks) {
     if (entry.kind != TrackKind::kPoint) continue;
     Track track = *entry.track;

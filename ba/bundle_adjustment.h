@@ -80,9 +80,11 @@ struct BundleResult {
   BundleStatus status = BundleStatus::kNotRun;
   std::string message;  // one sentence for a person
   /// Poses, points, and tracks with only the observations that fit them. Every track in it has a
-  /// point. Where `weak_frames` have no place of their own they keep a rotation and have no centre.
+  /// point. A frame whose place no observation tells keeps its rotation but has no centre, so it
+  /// has no pose: resect or interpolate it. The start, unchanged, when not usable.
   Reconstruction reconstruction;
-  /// Frames with a pose at the start but too few good observations to refine it.
+  /// Frames with a pose at the start but too few good observations to refine it; those that share
+  /// the centre of a refined frame still have a pose.
   std::vector<FrameId> weak_frames;
   BundleSummary summary;
   /// Whether `reconstruction` may be used in place of the start.
@@ -96,14 +98,17 @@ struct BundleResult {
 /// `options.fine`). Before every round all tracks are triangulated anew against the cameras of that
 /// moment and all observations are classified anew, so a good observation that a poor start threw
 /// out comes back.
-/// @param problem  at least two frames with poses. Throws std::invalid_argument on numbers that are
+/// @param problem  as documented there. Throws std::invalid_argument on numbers that are
 /// not finite, sigmas that are not positive, doubled track ids or frames within a track, frames in
 /// `shared_center` or `fixed_frames` without a pose, cycles in `shared_center`.
-/// @return  the gauge of the start: the first well-observed frame keeps its pose to the last bit
-/// and the farthest centre its distance along the line between them. With `fixed_frames` these keep
-/// theirs. Same bytes at any `options.num_threads`.
+/// @return  status kTooLittleData for an empty problem or one without parallax; else the gauge of
+/// the start: the first well-observed frame keeps its pose to the last bit and the farthest centre
+/// its distance along the line between them. With `fixed_frames` these keep theirs. Same bytes at
+/// any `options.num_threads`.
 /// Error:   truth to 1e-6 of the path length on clean scenes (ba tests).
-/// Cost:    per iteration linear in observations plus a Cholesky of 6 unknowns per camera.
+/// Cost:    per iteration linear in observations plus a Cholesky of 6 unknowns per camera; three
+/// rounds of 67 cameras, 13,000 points and 84,000 observations take 2 s on one core, of 150, 30,000
+/// and 270,000 about 8 s.
 /// Source:  Triggs et al., Bundle Adjustment - A Modern Synthesis, 1999; the chain of rounds is
 /// ours.
 BundleResult RefineBundle(const BundleProblem& problem, const BundleOptions& options);

@@ -41,8 +41,9 @@ struct BundleRound {
 
 struct BundleOptions {
   // From known-rotation positions, which are a few percent of the path length off, so that a tight
-  // test against them would throw away 5 to 10 % of the good observations: none is made.
-  BundleRound bridge = {.refine_rotations = false, .max_error_px = 0.0};
+  // test against them would throw away 5 to 10 % of the good observations: none is made. Outliers
+  // still in it keep the cost moving long after the cameras have arrived, hence the tolerance.
+  BundleRound bridge = {.refine_rotations = false, .max_error_px = 0.0, .function_tolerance = 1e-3};
   // What is within 4 px of the bridge, rotations free.
   BundleRound coarse = {.max_error_px = 4.0};
   // What is within 2 px of that. Its `max_error_px` also decides what the result keeps.
@@ -54,8 +55,9 @@ struct BundleOptions {
   // line, so two say nothing about the match; three do.
   int min_observations = 3;
   // A point needs two rays that meet at this angle, else its depth is noise. Low on purpose: a
-  // shallow point holds rotations well (see WithoutShallowPoints for clouds to look at). At a
-  // focal length of 700 px, 0.2 deg is 2.4 px of parallax.
+  // shallow point holds rotations well: 1 deg instead of 0.2 costs KITTI 00 (first 200 frames) 4 %
+  // of its position error, 0.05 deg gains nothing. At a focal length of 700 px, 0.2 deg is 2.4 px
+  // of parallax. For clouds to look at see WithoutShallowPoints.
   double min_angle_deg = 0.2;
   // A frame with fewer fitting observations is left out of a round: six unknowns on a handful of
   // points follow any outlier.

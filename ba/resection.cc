@@ -18,6 +18,9 @@ using Matrix6d = Eigen::Matrix<double, 6, 6>;
 // A step that gains less, in squared sigmas, moves the pose by 1e-4 of its standard deviation.
 constexpr double kWorthlessGain = 1e-9;
 
+// Steps at each of the wider scales, which only lead to the last one.
+constexpr int kCoarseIterations = 3;
+
 struct Pose {
   Rotation cam_from_world;
   Eigen::Vector3d center_in_world;
@@ -70,24 +73,21 @@ class Resection {
   }
 
   // `scale`: of Geman-McClure's loss s^2 / 2 r^2 / (r^2 + s^2); zero: inliers, plainly weighted.
-  Normal Evaluate(const Pose& pose, double scale, bool with_derivatives) const {
+  Normal Evaluate(const Pose& pose, double scale) const {
     Normal normal;
     const Eigen::Matrix3d R_c_w = pose.cam_from_world.Matrix();
     for (const PointSighting& sighting : sightings_) {
       if (scale == 0.0 && !IsInlier(pose, sighting)) continue;
       ReprojectionJacobian J;
-      const auto pixel = Reproject(camera_,
-                                   R_c_w,
-                                   pose.center_in_world,
-                                   sighting.point_in_world,
-                                   with_derivatives ? &J : nullptr);
+      const auto pixel =
+          Reproject(camera_, R_c_w, pose.center_in_world, sighting.point_in_world, &J);
       const Eigen::Vector2d residual =
           pixel ? Eigen::Vector2d((*pixel - sighting.keypoint_px) / sighting.sigma_px)
                 : Eigen::Vector2d::Constant(kUnseenResidual_px / sighting.sigma_px);
       const double squared = residual.squaredNorm();
       const double keep = scale == 0.0 ? 1.0 : scale * scale / (squared + scale * scale);
       normal.cost += 0.5 * squared * keep;
-      if (!with_derivatives || !pixel) continue;
+      if (!pixel) continue;
       Eigen::Matrix<double, 2, 6> J_pose;
       J_pose << J.by_rotation, J.by_center;
       J_pose /= sighting.sigma_px;
@@ -101,22 +101,22 @@ class Resection {
   }
 
   // Levenberg-Marquardt at one scale. Returns whether it settled.
-  bool Minimise(double scale, Pose& pose) const {
+  bool Minimise(double scale, int max_iterations, Pose& pose) const {
     double damping = 1e-6;
-    Normal normal = Evaluate(pose, scale, true);
-    for (int iteration = 0; iteration < options_.max_iterations; ++iteration) {
+    Normal normal = Evaluate(pose, scale);
+    for (int iteration = 0; iteration < max_iterations; ++iteration) {
       Matrix6d H = normal.H;
       H.diagonal() *= 1.0 + damping;
       const Vector6d step = -H.ldlt().solve(normal.g);
       if (!step.allFinite()) return false;
       // Cost this step may gain, in squared sigmas.
       const double expected = -0.5 * normal.g.dot(step);
-      const Pose next = {Rotation::Exp(step.head<3>()) * pose.cam_from_world,
-                         pose.center_in_world + step.tail<3>()};
-      const double cost = Evaluate(next, scale, false).cost;
-      if (cost <= normal.cost) {
-        pose = Kept(next, pose);
-        normal = Evaluate(pose, scale, true);
+      const Pose next = Moved(pose, step);
+      // Most steps are taken, so the derivatives at the next pose are rarely in vain.
+      const Normal next_normal = Evaluate(next, scale);
+      if (next_normal.cost <= normal.cost) {
+        pose = next;
+        normal = next_normal;
         damping = std::max(1e-12, 0.1 * damping);
       } else {
         damping *= 10.0;
@@ -128,9 +128,13 @@ class Resection {
 
  private:
   // What is held keeps its last bit.
-  Pose Kept(const Pose& next, const Pose& old) const {
-    return {options_.refine_rotation ? next.cam_from_world : old.cam_from_world,
-            options_.refine_center ? next.center_in_world : old.center_in_world};
+  Pose Moved(const Pose& pose, const Vector6d& step) const {
+    Pose moved = pose;
+    if (options_.refine_rotation) {
+      moved.cam_from_world = Rotation::Exp(step.head<3>()) * pose.cam_from_world;
+    }
+    if (options_.refine_center) moved.center_in_world += step.tail<3>();
+    return moved;
   }
 
   void AddPrior(const Pose& pose, Normal& normal) const {
@@ -222,9 +226,9 @@ std::optional<ResectedPose> ResectFrame(const Camera& camera,
   // Wide at first, so that a start that is off still feels the inliers.
   double scale = std::max(options.loss_scale, 2.0 * resection.MedianSigmas(pose));
   for (; scale > options.loss_scale; scale = std::max(options.loss_scale, 0.5 * scale)) {
-    resection.Minimise(scale, pose);
+    resection.Minimise(scale, kCoarseIterations, pose);
   }
-  if (!resection.Minimise(options.loss_scale, pose)) return std::nullopt;
+  if (!resection.Minimise(options.loss_scale, options.max_iterations, pose)) return std::nullopt;
 
   ResectedPose result;
   result.cam_from_world = pose.cam_from_world;
@@ -238,7 +242,7 @@ std::optional<ResectedPose> ResectFrame(const Camera& camera,
   }
   if (result.num_inliers < options.min_inliers) return std::nullopt;
   result.rms_px = std::sqrt(squares / result.num_inliers);
-  const std::optional<Matrix6d> covariance = Covariance(resection.Evaluate(pose, 0.0, true).H);
+  const std::optional<Matrix6d> covariance = Covariance(resection.Evaluate(pose, 0.0).H);
   if (!covariance) return std::nullopt;
   result.covariance = *covariance;
   if (!options.refine_rotation) result.covariance.topLeftCorner<3, 3>().setZero();
