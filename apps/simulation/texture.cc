@@ -103,25 +103,29 @@ float Mosaic(std::uint64_t seed, double s, double t, float width, float cell_s, 
 float Marks(std::uint64_t seed, double s, double t, float width, float cell, float density) {
   const float visible = Resolved(0.25f * cell, width);
   if (visible <= 0.0f) return 0.0f;
-  const std::int64_t i = Floor(s / cell);
-  const std::int64_t j = Floor(t / cell);
+  const double inverse = 1.0 / cell;
+  const std::int64_t i = Floor(s * inverse);
+  const std::int64_t j = Floor(t * inverse);
   const std::uint64_t hash = HashBits(seed, i, j);
   if (UnitFrom(hash, 0) >= density) return 0.0f;
   const float x =
-      static_cast<float>(s / cell - static_cast<double>(i)) - 0.5f - 0.14f * Signed(hash, 8);
+      static_cast<float>(s * inverse - static_cast<double>(i)) - 0.5f - 0.14f * Signed(hash, 8);
   const float y =
-      static_cast<float>(t / cell - static_cast<double>(j)) - 0.5f - 0.14f * Signed(hash, 16);
-  const float w = width / cell;
+      static_cast<float>(t * inverse - static_cast<double>(j)) - 0.5f - 0.14f * Signed(hash, 16);
+  const float w = width * static_cast<float>(inverse);
   const float size = 0.14f + 0.16f * UnitFrom(hash, 24);
   const float ratio = 0.3f + 0.7f * UnitFrom(hash, 32);
+  const float reach = size * std::numbers::sqrt2_v<float> + w;
+  if (x * x + y * y > reach * reach) return 0.0f;
   const float tint = Signed(hash, 40);
   const float strength = visible * (tint < 0.0f ? -0.45f + 0.55f * tint : 0.45f + 0.55f * tint);
   const int kind = static_cast<int>((hash >> 48) & 7u);
-  if (kind <= 3) {  // bar, upright or turned
-    if (kind == 0) return strength * CoverRect(x, y, size, size * ratio, w);
-    const float angle = std::numbers::pi_v<float> * UnitFrom(hash, 52);
-    const float c = std::cos(angle);
-    const float sn = std::sin(angle);
+  if (kind == 0) return strength * CoverRect(x, y, size, size * ratio, w);
+  if (kind <= 3) {  // a turned bar; cosine and sine by the tangent of the half angle
+    const float tangent = Signed(hash, 52);
+    const float unit = 1.0f / (1.0f + tangent * tangent);
+    const float c = (1.0f - tangent * tangent) * unit;
+    const float sn = 2.0f * tangent * unit;
     return strength * CoverRect(c * x + sn * y, c * y - sn * x, size, size * ratio, w);
   }
   const float radius = std::sqrt(x * x + y * y);
@@ -311,7 +315,7 @@ float Facade(const Material& m, double s, double t, float width) {
 
 float Asphalt(const Material& m, double s, double t, float width) {
   const float patches = Marks(m.seed + 1, s, t, width, 3.1f, 0.6f);
-  return 0.20f * patches + 0.15f * Octaves(m.seed + 3, s, t, width, 1.1f, 6, 0.8f) +
+  return 0.20f * patches + 0.17f * Octaves(m.seed + 3, s, t, width, 1.1f, 4, 0.8f) +
          0.20f * Detail(m.seed + 20, s, t, width, 1.3f, 5, 0.45f, 0.95f);
 }
 
@@ -393,7 +397,7 @@ float Panel(const Material& m, double s, double t, float width) {
 }
 
 float Sky(const Material& m, double s, double t, float width) {
-  return 0.08f * Octaves(m.seed, s, 2.0 * t, width, 0.5f, 4, 0.5f);
+  return 0.08f * Octaves(m.seed, s, 2.0 * t, width, 0.5f, 3, 0.5f);
 }
 
 float Figure(const Material& m, double s, double t, float width) {

@@ -16,6 +16,25 @@ constexpr int kLeafSize = 3;
 // Rays that graze the seam of two surfaces must not slip through.
 constexpr double kSeam = 1e-9;
 
+// Axis-aligned box around surfaces, a little larger than they are.
+struct Bounds {
+  Eigen::Array3d low = Eigen::Array3d::Constant(std::numeric_limits<double>::infinity());
+  Eigen::Array3d high = -low;
+
+  void Add(const Surface& surface) {
+    for (int corner = 0; corner < (surface.triangle ? 3 : 4); ++corner) {
+      const Eigen::Array3d point =
+          (surface.origin + (corner & 1) * surface.edge_u + (corner >> 1) * surface.edge_v).array();
+      low = low.min(point - 1e-7);
+      high = high.max(point + 1e-7);
+    }
+  }
+  double HalfArea() const {
+    const Eigen::Array3d size = high - low;
+    return size.x() * size.y() + size.y() * size.z() + size.z() * size.x();
+  }
+};
+
 }  // namespace
 
 Surface MakeQuad(const Eigen::Vector3d& origin,
@@ -93,25 +112,43 @@ World::World(std::vector<Surface> surfaces, const Light& light, const Material& 
   BuildNode(0, count, centers);
 }
 
+int World::Split(int begin, int end, int axis, const std::vector<Eigen::Array3d>& centers) {
+  const auto before = [&](int a, int b) {
+    const double ca = centers[a][axis];
+    const double cb = centers[b][axis];
+    return ca != cb ? ca < cb : a < b;
+  };
+  std::sort(order_.begin() + begin, order_.begin() + end, before);
+  // Where the two halves' areas, weighted by their counts, are least: a ray then meets few of both.
+  const int count = end - begin;
+  std::vector<double> cost(static_cast<std::size_t>(count), 0.0);
+  for (const bool from_end : {false, true}) {
+    Bounds bounds;
+    for (int k = 1; k < count; ++k) {
+      bounds.Add(surfaces_[order_[from_end ? end - k : begin + k - 1]]);
+      cost[from_end ? count - k : k] += k * bounds.HalfArea();
+    }
+  }
+  // Each side keeps a quarter, which bounds the depth of the tree: Cast has a stack of fixed size.
+  const int margin = std::max(1, count / 4);
+  const auto best = std::min_element(cost.begin() + margin, cost.end() - margin + 1);
+  return begin + static_cast<int>(best - cost.begin());
+}
+
 void World::BuildNode(int begin, int end, const std::vector<Eigen::Array3d>& centers) {
   const int index = static_cast<int>(nodes_.size());
   nodes_.emplace_back();
   Node node;
-  node.low.setConstant(std::numeric_limits<double>::infinity());
-  node.high = -node.low;
-  Eigen::Array3d center_low = node.low;
-  Eigen::Array3d center_high = node.high;
+  Bounds bounds;
+  Eigen::Array3d center_low = bounds.low;
+  Eigen::Array3d center_high = bounds.high;
   for (int k = begin; k < end; ++k) {
-    const Surface& surface = surfaces_[order_[k]];
-    for (int corner = 0; corner < (surface.triangle ? 3 : 4); ++corner) {
-      const Eigen::Array3d point =
-          (surface.origin + (corner & 1) * surface.edge_u + (corner >> 1) * surface.edge_v).array();
-      node.low = node.low.min(point - 1e-7);
-      node.high = node.high.max(point + 1e-7);
-    }
+    bounds.Add(surfaces_[order_[k]]);
     center_low = center_low.min(centers[order_[k]]);
     center_high = center_high.max(centers[order_[k]]);
   }
+  node.low = bounds.low;
+  node.high = bounds.high;
   (center_high - center_low).maxCoeff(&node.axis);
   if (end - begin <= kLeafSize) {
     node.first = begin;
@@ -119,13 +156,7 @@ void World::BuildNode(int begin, int end, const std::vector<Eigen::Array3d>& cen
     nodes_[index] = node;
     return;
   }
-  const int middle = (begin + end) / 2;
-  const auto before = [&](int a, int b) {
-    const double ca = centers[a][node.axis];
-    const double cb = centers[b][node.axis];
-    return ca != cb ? ca < cb : a < b;
-  };
-  std::nth_element(order_.begin() + begin, order_.begin() + middle, order_.begin() + end, before);
+  const int middle = Split(begin, end, node.axis, centers);
   BuildNode(begin, middle, centers);
   node.first = static_cast<int>(nodes_.size());
   node.count = 0;

@@ -122,6 +122,8 @@ class World {
   };
 
   void BuildNode(int begin, int end, const std::vector<Eigen::Array3d>& centers);
+  // Sorts order_[begin, end) along an axis and says where to cut it.
+  int Split(int begin, int end, int axis, const std::vector<Eigen::Array3d>& centers);
   bool HitPlate(int surface,
                 const Eigen::Vector3d& origin,
                 const Eigen::Vector3d& direction,
