@@ -14,10 +14,10 @@ namespace rotslam {
 struct KeyframeOptions {
   // A frame becomes a keyframe when the median angle between its rays and the last keyframe's,
   // rotation taken out, has grown to this: less gives more keyframes than triangulation gains from.
-  double min_parallax_deg = 1.0;
+  double min_parallax_deg = 2.0;
   // It becomes one before fewer than this share of the last keyframe's tracks is left, so that
   // tracks link neighbouring keyframes.
-  double min_shared_ratio = 0.6;
+  double min_shared_ratio = 0.35;
 
   std::optional<std::string> Problem() const;
 

@@ -158,6 +158,60 @@ TEST(Simulation, SamePointLooksTheSameFromTwoPlaces) {
   }
 }
 
+TEST(RenderFrame, PixelIsTheAverageOverItsSquare) {
+  // The slow, obvious way: 6 x 6 rays a pixel, each with the texture of a sixth of its footprint.
+  Light flat;
+  flat.ambient = 1.0f;
+  flat.diffuse = 0.0f;
+  const World world(MakeRoom(3).Surfaces(), flat, {});
+  // A narrow view, pixels as fine as those of a 640 x 480 camera.
+  const Camera camera = CameraWithView(80, 60, 9.1);
+  const Simulation room(Small(SimulationKind::kGimbal));
+  RenderOptions options;
+  options.noise_grey = 0.0;
+  options.exposure_variation = 0.0;
+  for (const int k : {0, 8, 10, 19}) {
+    const StampedPose& pose = room.Truth()[k];
+    const cv::Mat image = RenderFrame(
+        world, {}, PixelRays(camera), [&](double) { return pose; }, 0.0, 0, options);
+    const auto mean_square = [&](double shift_x, double shift_y) {
+      constexpr int kRays = 6;
+      double sum = 0.0;
+      for (int y = 0; y < camera.height; ++y) {
+        for (int x = 0; x < camera.width; ++x) {
+          double light = 0.0;
+          for (int ray = 0; ray < kRays * kRays; ++ray) {
+            const double a = x + shift_x + (ray % kRays + 0.5) / kRays - 0.5;
+            const double b = y + shift_y + (ray / kRays + 0.5) / kRays - 0.5;
+            const Eigen::Vector3d direction = pose.world_from_cam * *camera.Unproject({a, b});
+            const World::Hit hit = world.Cast(pose.center_in_world, direction);
+            const Eigen::Vector2d st = world.TextureCoordinates(
+                hit.surface, pose.center_in_world + hit.distance * direction);
+            light += Albedo(world.Surfaces()[hit.surface].material,
+                            st.x(),
+                            st.y(),
+                            static_cast<float>(hit.distance / camera.fx / kRays));
+          }
+          const double gap = image.at<std::uint8_t>(y, x) - 255.0 * light / (kRays * kRays);
+          sum += gap * gap;
+        }
+      }
+      return sum / (camera.width * camera.height);
+    };
+    // Small, and least where the picture is: the vertex of a parabola through three shifts.
+    const double h = 0.3;
+    const double aligned = mean_square(0.0, 0.0);
+    EXPECT_LT(std::sqrt(aligned),
+              15.0);  // detail near a pixel's size fades sooner than it averages
+    const double left = mean_square(-h, 0.0);
+    const double right = mean_square(h, 0.0);
+    const double above = mean_square(0.0, -h);
+    const double below = mean_square(0.0, h);
+    EXPECT_NEAR(0.5 * h * (left - right) / (left - 2.0 * aligned + right), 0.0, 0.04) << k;
+    EXPECT_NEAR(0.5 * h * (above - below) / (above - 2.0 * aligned + below), 0.0, 0.04) << k;
+  }
+}
+
 TEST(Simulation, OrbFindsThousandsOfCornersSpreadOverTheImage) {
   for (const SimulationKind kind : kKinds) {
     SimulationOptions options;
@@ -338,6 +392,28 @@ TEST(Paths, StayClearOfTheWorld) {
         EXPECT_GT(hit.distance, kind == SimulationKind::kStreet ? 2.0 : 0.3)
             << Name(kind) << " at " << pose.center_in_world.transpose() << ", " << k;
       }
+    }
+  }
+}
+
+TEST(MakeStreet, NeverBlocksTheRoad) {
+  Trajectory path;  // an eight: the road crosses itself
+  for (int k = 0; k < 300; ++k) {
+    const double angle = 2.0 * 180.0 * kRadFromDeg * k / 300.0;
+    StampedPose pose;
+    pose.center_in_world = {
+        45.0 * std::sin(2.0 * angle), 2.0 * std::sin(angle), 70.0 * std::sin(angle)};
+    path.push_back(pose);
+  }
+  const World world = MakeStreet(path, {});
+  EXPECT_GT(world.Surfaces().size(), 1000u);
+  for (const StampedPose& pose : path) {
+    for (int k = 0; k < 32; ++k) {
+      const double angle = k * 11.25 * kRadFromDeg;
+      const Eigen::Vector3d ray(std::sin(angle), 0.0, std::cos(angle));
+      // A metre above the road: the height of a parked car.
+      const Eigen::Vector3d start = pose.center_in_world + Eigen::Vector3d(0.0, 0.65, 0.0);
+      EXPECT_GT(world.Cast(start, ray).distance, 2.0) << start.transpose() << ", " << k;
     }
   }
 }
