@@ -56,13 +56,15 @@ Json KrotToJson(const SummaryKrot& krot) {
   return object;
 }
 
-Json SegmentsToJson(const std::vector<SummarySegment>& segments) {
+Json SegmentsToJson(const std::vector<Segment>& segments) {
   Json list = Json::array();
-  for (const SummarySegment& segment : segments) {
+  for (const Segment& segment : segments) {
     list.push_back({{"first_frame", segment.first_frame},
                     {"last_frame", segment.last_frame},
                     {"kind", segment.kind},
-                    {"component", segment.component}});
+                    {"component", segment.component},
+                    {"scale", segment.scale},
+                    {"evidence", segment.evidence}});
   }
   return list;
 }

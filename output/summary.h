@@ -10,6 +10,7 @@
 #include <vector>
 
 #include "output/option_list.h"
+#include "output/segments.h"
 #include "rotodom/camera/camera.h"
 
 namespace rotslam {
@@ -18,14 +19,6 @@ namespace rotslam {
 /// "inliers.median" becomes {"inliers": {"median": ..}} with its neighbours.
 using SummaryValue = std::variant<bool, std::int64_t, double, std::string>;
 using SummaryTable = std::vector<std::pair<std::string, SummaryValue>>;
-
-/// A stretch of frames of one kind of motion; a line of segments.csv.
-struct SummarySegment {
-  int first_frame = 0;
-  int last_frame = 0;
-  std::string kind;  // translating, rotating or still
-  int component = 0;
-};
 
 /// What krot proved. gamma is in normalised image units, gamma_px in pixels.
 struct SummaryKrot {
@@ -50,7 +43,7 @@ struct RunSummary {
   std::optional<SummaryTable> rotodom;
   std::optional<SummaryKrot> krot;
   std::optional<SummaryTable> ba;
-  std::optional<std::vector<SummarySegment>> segments;
+  std::optional<std::vector<Segment>> segments;
   std::optional<SummaryTable> loops;
 };
 

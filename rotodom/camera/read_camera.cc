@@ -62,8 +62,8 @@ int PixelCount(const fs::path& file, const std::string& key, const std::string& 
 // A map of a YAML file, with the place it has there, so that what is wrong can be named.
 class Section {
  public:
-  Section(fs::path file, YAML::Node node, std::string prefix)
-      : file_(std::move(file)), node_(std::move(node)), prefix_(std::move(prefix)) {}
+  Section(fs::path file, const YAML::Node& node, std::string prefix)
+      : file_(std::move(file)), node_(node), prefix_(std::move(prefix)) {}
 
   const fs::path& file() const { return file_; }
   std::string FullKey(const std::string& key) const { return prefix_ + key; }
@@ -328,7 +328,7 @@ Camera ReadColmapLine(const fs::path& file, const std::vector<std::string>& word
   if (found == models.end()) {
     std::string known;
     for (const ColmapModel& model : models) {
-      known += (known.empty() ? "" : ", ") + std::string(model.name);
+      known.append(known.empty() ? "" : ", ").append(model.name);
     }
     Fail(file, who + "model is '" + words[1] + "', must be one of " + known);
   }
@@ -345,7 +345,7 @@ Camera ReadColmapLine(const fs::path& file, const std::vector<std::string>& word
   for (std::size_t k = 0; k < num_given; ++k) {
     const std::string& name = found->parameters[k];
     const std::string& text = words[4 + k];
-    const std::string key = who + (name == "0" ? "k" + std::to_string(k - 5) : name);
+    std::string key = who + (name == "0" ? "k" + std::to_string(k - 5) : name);
     const double value = FiniteNumber(file, key, text);
     if (name == "f") camera.fx = camera.fy = PositiveNumber(file, key, text);
     if (name == "fx") camera.fx = PositiveNumber(file, key, text);
@@ -359,7 +359,8 @@ Camera ReadColmapLine(const fs::path& file, const std::vector<std::string>& word
     if (name == "k3") camera.distortion[camera.model == CameraModel::kRadtan ? 4 : 2] = value;
     if (name == "k4") camera.distortion[3] = value;
     if (name == "0" && value != 0.0) {
-      Fail(file, key + " is " + text + ", but a denominator of the distortion is not supported");
+      key.append(" is ").append(text);
+      Fail(file, key.append(", but a denominator of the distortion is not supported"));
     }
   }
   camera.model = WithoutEmptyDistortion(camera);
@@ -386,9 +387,8 @@ bool IsColmapLine(const std::vector<std::string>& words) {
          all(words[1], "ABCDEFGHIJKLMNOPQRSTUVWXYZ_0123456789") && all(words[2], "0123456789");
 }
 
-Camera ReadYaml(const fs::path& file, std::string text) {
-  // OpenCV's first line, "%YAML:1.0", is no directive that YAML knows.
-  if (text.rfind("%YAML:", 0) == 0) text.insert(0, "#");
+// OpenCV's first line, "%YAML:1.0", is a directive without a meaning to yaml-cpp, which skips it.
+Camera ReadYaml(const fs::path& file, const std::string& text) {
   YAML::Node root;
   try {
     root = YAML::Load(text);
@@ -468,7 +468,8 @@ std::string CameraYaml(const Camera& camera) {
                                                                    : 4;
   text += "distortion: [";
   for (std::size_t k = 0; k < count; ++k) {
-    text += (k == 0 ? "" : ", ") + NumberText(camera.distortion[k]);
+    if (k > 0) text += ", ";
+    text += NumberText(camera.distortion[k]);
   }
   return text + "]\n";
 }

@@ -4,6 +4,8 @@
 #include <cmath>
 #include <cstdint>
 #include <fstream>
+#include <functional>
+#include <future>
 #include <iomanip>
 #include <iterator>
 #include <sstream>
@@ -40,11 +42,14 @@ cv::Mat ToEightBits(cv::Mat image, std::string& problem) {
   return {};
 }
 
-// A JPEG file that ends before its end marker decodes to grey below the break.
+// A JPEG file that ends before its end marker decodes to grey below the break. The marker must come
+// behind the start of the last scan: a thumbnail in the header has markers of its own.
 bool IsCutOffJpeg(const std::vector<unsigned char>& bytes) {
   if (bytes.size() < 4 || bytes[0] != 0xff || bytes[1] != 0xd8) return false;
-  const unsigned char kEnd[] = {0xff, 0xd9};
-  return std::find_end(bytes.begin(), bytes.end(), std::begin(kEnd), std::end(kEnd)) == bytes.end();
+  constexpr unsigned char kScan[] = {0xff, 0xda};
+  constexpr unsigned char kEnd[] = {0xff, 0xd9};
+  const auto scan = std::find_end(bytes.begin(), bytes.end(), std::begin(kScan), std::end(kScan));
+  return std::search(scan, bytes.end(), std::begin(kEnd), std::end(kEnd)) == bytes.end();
 }
 
 cv::Mat DecodeImage(const fs::path& file, std::string& problem) {
@@ -113,6 +118,17 @@ class FileSequence : public Sequence {
   }
 
  private:
+  struct Decoded {
+    cv::Mat image;
+    std::string problem;
+  };
+
+  static Decoded DecodeEntry(const ImageEntry& entry) {
+    Decoded decoded;
+    decoded.image = DecodeImage(entry.file, decoded.problem);
+    return decoded;
+  }
+
   void FindImageSize() {
     std::string first_problem;
     for (const ImageEntry& entry : entries_) {
@@ -136,12 +152,18 @@ class FileSequence : public Sequence {
     frame.id = FrameId{next_++};
     frame.timestamp_s = entry.timestamp_s;
     frame.name = entry.file.filename().string();
-    frame.image = DecodeImage(entry.file, frame.problem);
+    Decoded decoded = ahead_.valid() ? ahead_.get() : DecodeEntry(entry);
+    if (next_ < num_frames_) {
+      ahead_ = std::async(std::launch::async, DecodeEntry, std::cref(entries_[next_]));
+    }
+    frame.image = std::move(decoded.image);
+    frame.problem = std::move(decoded.problem);
     return frame;
   }
 
   std::vector<ImageEntry> entries_;
   int next_ = 0;
+  std::future<Decoded> ahead_;  // image next_, decoded while the caller works on the one before
 };
 
 // FFmpeg where OpenCV has it: with any other back end allowed, a file that is no video makes each

@@ -62,7 +62,7 @@ TEST(Summary, HoldsTheDocumentedKeys) {
   summary.krot->status = "converged";
   summary.krot->more = {{"rounds", std::int64_t{2}}};
   summary.ba = SummaryTable{{"error_px.rms", 0.5}, {"error_px.median", 0.25}};
-  summary.segments = {{0, 10, "rotating", 0}};
+  summary.segments = {{0, 10, "rotating", 0, "reference", 0.9}};
   summary.loops = SummaryTable{{"accepted", std::int64_t{1}}};
   WriteSummary(folder.path() / "summary.json", summary);
   const auto json = nlohmann::ordered_json::parse(ReadWholeFile(folder.path() / "summary.json"));

@@ -138,11 +138,12 @@ TEST_F(ReadCameraTest, Kalibr) {
 
 TEST_F(ReadCameraTest, Kitti) {
   const std::string p0 =
-      "P0: 7.18856e+02 0.0e+00 6.071928e+02 0.0 0.0 7.18856e+02 1.852157e+02 0.0 0.0 0.0 1.0 0.0\n";
+      "P0: 7.18856e+02 0.0e+00 6.071928e+02 0.0 0.0 7.18857e+02 1.852157e+02 0.0 0.0 0.0 1.0 0.0\n";
   EXPECT_EQ(Read(p0 + "P1: 1 2 3\nTr: 1 2\n"),
-            Make(CameraModel::kPinhole, {0, 0}, {718.856, 718.856, 607.1928, 185.2157}));
+            Make(CameraModel::kPinhole, {0, 0}, {718.856, 718.857, 607.1928, 185.2157}));
   EXPECT_THAT(Complaint("P0: 718.856 0 607 0 0 718\n"), HasSubstr("P0 has 6 values"));
   EXPECT_THAT(Complaint("P0: 0 0 607 0 0 718 185 0 0 0 1 0\n"), HasSubstr("focal length"));
+  EXPECT_THAT(Complaint("P0: 718 1 607 0 0 718 185 0 0 0 1 0\n"), HasSubstr("P0 is not of the"));
   EXPECT_THAT(Complaint("P0: nan 0 607 0 0 718 185 0 0 0 1 0\n"), HasSubstr("P0[0] is 'nan'"));
 }
 

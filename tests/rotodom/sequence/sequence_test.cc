@@ -88,6 +88,14 @@ TEST_F(SequenceTest, GivesEachFrameOnceInOrder) {
   EXPECT_FALSE(sequence->Next());
 }
 
+TEST_F(SequenceTest, MayBeLeftInTheMiddle) {
+  WriteTen();
+  const auto sequence = OpenSequence(folder_, {});
+  const std::optional<Frame> kept = sequence->Next();
+  ASSERT_TRUE(sequence->Next());
+  EXPECT_EQ(kept->image.at<unsigned char>(3, 4), 0);  // its pixels are its own
+}
+
 TEST_F(SequenceTest, TakesFirstLastAndStride) {
   WriteTen();
   SequenceOptions options;

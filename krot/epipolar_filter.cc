@@ -1,0 +1,138 @@
+#include "krot/epipolar_filter.h"
+
+#include <algorithm>
+#include <cmath>
+#include <map>
+#include <utility>
+
+#include <Eigen/Geometry>
+
+#include "krot/draw.h"
+
+namespace rotslam {
+namespace {
+
+struct SharedTrack {
+  ObservationIndex first;
+  ObservationIndex second;
+  Eigen::Vector3d ray_a;  // world frame
+  Eigen::Vector3d ray_b;
+  Eigen::Vector3d normal;  // ray_a x ray_b, as long as the sine of the parallax
+};
+
+// Angle by which the two rays miss a common plane with `direction`; the smaller of the two ways to
+// measure it, so a ray near the epipole does not blow it up.
+double PlaneError(const SharedTrack& shared, const Eigen::Vector3d& direction) {
+  const double volume = std::abs(shared.normal.dot(direction));
+  const double sine =
+      std::max(direction.cross(shared.ray_a).norm(), direction.cross(shared.ray_b).norm());
+  return volume / std::max(sine, 1e-12);
+}
+
+int CountInliers(const std::vector<SharedTrack>& shared,
+                 const Eigen::Vector3d& direction,
+                 double threshold) {
+  int count = 0;
+  for (const SharedTrack& track : shared) count += PlaneError(track, direction) <= threshold;
+  return count;
+}
+
+Eigen::Vector3d VoteDirection(const std::vector<SharedTrack>& shared,
+                              const EpipolarFilterOptions& options,
+                              std::uint64_t seed) {
+  Draw draw(seed);
+  const int count = static_cast<int>(shared.size());
+  Eigen::Vector3d best = Eigen::Vector3d::UnitZ();
+  int most = -1;
+  for (int sample = 0; sample < options.max_samples; ++sample) {
+    const SharedTrack& a = shared[draw.Index(count)];
+    const SharedTrack& b = shared[draw.Index(count)];
+    const Eigen::Vector3d direction = a.normal.cross(b.normal);
+    if (!(direction.norm() > 1e-12)) continue;
+    const int inliers = CountInliers(shared, direction.normalized(), options.threshold_rad);
+    if (inliers <= most) continue;
+    most = inliers;
+    best = direction.normalized();
+  }
+  return best;
+}
+
+using PairMap = std::map<std::pair<FrameId, FrameId>, std::vector<SharedTrack>>;
+
+// The pairs worth testing: for each view its later partners with most tracks in common.
+std::vector<std::pair<FrameId, FrameId>> ChoosePairs(const std::vector<Track>& tracks,
+                                                     const EpipolarFilterOptions& options) {
+  std::map<std::pair<FrameId, FrameId>, int> shared;
+  for (const Track& track : tracks) {
+    for (std::size_t a = 0; a < track.observations.size(); ++a) {
+      const std::size_t end = std::min(track.observations.size(), a + 9);
+      for (std::size_t b = a + 1; b < end; ++b) {
+        ++shared[{track.observations[a].frame, track.observations[b].frame}];
+      }
+    }
+  }
+  std::map<FrameId, std::vector<std::pair<int, FrameId>>> partners;
+  for (const auto& [pair, count] : shared) {
+    if (count >= options.min_shared_tracks) partners[pair.first].emplace_back(-count, pair.second);
+  }
+  std::vector<std::pair<FrameId, FrameId>> pairs;
+  for (auto& [view, others] : partners) {
+    std::sort(others.begin(), others.end());
+    const std::size_t keep =
+        std::min<std::size_t>(others.size(), static_cast<std::size_t>(options.partners_per_view));
+    for (std::size_t k = 0; k < keep; ++k) pairs.emplace_back(view, others[k].second);
+  }
+  return pairs;
+}
+
+PairMap CollectShared(const RotationMap& cam_from_world,
+                      const std::vector<Track>& tracks,
+                      const EpipolarFilterOptions& options) {
+  PairMap pairs;
+  for (const auto& pair : ChoosePairs(tracks, options)) pairs[pair];
+  for (int t = 0; t < static_cast<int>(tracks.size()); ++t) {
+    const auto& observations = tracks[t].observations;
+    std::vector<Eigen::Vector3d> rays;
+    for (const Observation& observation : observations) {
+      rays.push_back(cam_from_world.at(observation.frame).Inverse() * observation.bearing);
+    }
+    for (int a = 0; a < static_cast<int>(observations.size()); ++a) {
+      const int end = std::min(static_cast<int>(observations.size()), a + 9);
+      for (int b = a + 1; b < end; ++b) {
+        const auto entry = pairs.find({observations[a].frame, observations[b].frame});
+        if (entry == pairs.end()) continue;
+        entry->second.push_back({{t, a}, {t, b}, rays[a], rays[b], rays[a].cross(rays[b])});
+      }
+    }
+  }
+  return pairs;
+}
+
+}  // namespace
+
+std::vector<ObservationIndex> FindEpipolarOutliers(const RotationMap& cam_from_world,
+                                                   const std::vector<Track>& tracks,
+                                                   const EpipolarFilterOptions& options) {
+  std::map<ObservationIndex, int> balance;  // pairs failed minus pairs passed
+  std::uint64_t pair_number = 0;
+  for (const auto& [pair, shared] : CollectShared(cam_from_world, tracks, options)) {
+    const std::uint64_t seed = options.seed * 1000003u + pair_number++;
+    if (static_cast<int>(shared.size()) < options.min_shared_tracks) continue;
+    const Eigen::Vector3d direction = VoteDirection(shared, options, seed);
+    // A pair without a majority says nothing of its tracks.
+    const int agreeing = CountInliers(shared, direction, options.threshold_rad);
+    if (2 * agreeing < static_cast<int>(shared.size())) continue;
+    for (const SharedTrack& track : shared) {
+      const int vote = PlaneError(track, direction) <= options.threshold_rad ? -1 : 1;
+      balance[track.first] += vote;
+      balance[track.second] += vote;
+    }
+  }
+  std::vector<ObservationIndex> outliers;
+  for (const auto& [index, votes] : balance) {
+    if (votes > 0) outliers.push_back(index);
+  }
+  return outliers;
+}
+
+}  // namespace rotslam

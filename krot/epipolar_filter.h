@@ -1,0 +1,34 @@
+#pragma once
+
+#include <cstdint>
+#include <vector>
+
+#include "rotodom/types/maps.h"
+#include "rotodom/types/track.h"
+
+namespace rotslam {
+
+struct EpipolarFilterOptions {
+  double threshold_rad = 0.0057;  // angle between a ray and the epipolar plane; 4 px at f = 700
+  int max_samples = 100;          // two-track samples per pair of views
+  // Each view is tested against this many views that share the most tracks with it and come later.
+  int partners_per_view = 3;
+  int min_shared_tracks = 12;  // pairs with fewer say nothing
+  std::uint64_t seed = 1;
+};
+
+/// An observation, as positions in the track list.
+struct ObservationIndex {
+  int track = 0;
+  int observation = 0;
+  auto operator<=>(const ObservationIndex&) const = default;
+};
+
+/// Observations that contradict the known rotations: off the epipolar plane in more of the tested
+/// pairs than on it. The plane of a pair is spanned by a translation direction drawn from two
+/// tracks and voted by all. Zero baseline is harmless: rays then coincide and lie on every plane.
+std::vector<ObservationIndex> FindEpipolarOutliers(const RotationMap& cam_from_world,
+                                                   const std::vector<Track>& tracks,
+                                                   const EpipolarFilterOptions& options);
+
+}  // namespace rotslam

@@ -1,0 +1,62 @@
+#include "krot/robust_start.h"
+
+#include <algorithm>
+#include <stdexcept>
+
+namespace rotslam {
+namespace {
+
+// The next round's price of one observation.
+double NextWeight(const MinimaxProblem& problem,
+                  const MinimaxStructure& structure,
+                  const ImageObservation& observation,
+                  double residual,
+                  double gamma) {
+  constexpr double kFloor = 1e-6;  // an observation behind its camera costs next to nothing
+  if (residual == kInfinity) return kFloor;
+  const double depth = problem.R_c_w[observation.view].row(2).dot(
+      structure.point_in_world[observation.point] - structure.center_in_world[observation.view]);
+  const double excess = std::max(0.0, residual - gamma) / gamma;
+  return std::max(kFloor, 1.0 / ((1.0 + excess * excess) * std::max(1.0, depth)));
+}
+
+}  // namespace
+
+std::optional<std::string> RobustStartOptions::Problem() const {
+  if (max_rounds < 1) return "max_rounds is " + std::to_string(max_rounds) + ", must be at least 1";
+  if (!(depth_price > 0.0)) {
+    return "depth_price is " + std::to_string(depth_price) + ", must be above 0";
+  }
+  return std::nullopt;
+}
+
+RobustStart SolveRobustStart(const MinimaxProblem& problem,
+                             double gamma,
+                             const RobustStartOptions& options) {
+  if (const auto trouble = options.Problem()) {
+    throw std::invalid_argument("RobustStartOptions: " + *trouble);
+  }
+  if (!(gamma > 0.0)) throw std::invalid_argument("robust start: gamma must be above 0");
+  RobustStart start;
+  std::vector<double> weights;
+  while (start.num_programs < options.max_rounds) {
+    MinimaxLpResult lp = SolveL1Slack(problem, gamma, options.depth_price, weights, options.lp);
+    ++start.num_programs;
+    if (lp.call != LpCallStatus::kCompleted) return start;  // the round before still stands
+    start.call = lp.call;
+    start.structure = std::move(lp.structure);
+    start.residuals.clear();
+    weights.clear();
+    double largest = 0.0;
+    for (const ImageObservation& observation : problem.observations) {
+      const double residual = BoxResidual(problem, start.structure, observation);
+      start.residuals.push_back(residual);
+      weights.push_back(NextWeight(problem, start.structure, observation, residual, gamma));
+      largest = std::max(largest, residual);
+    }
+    if (largest <= 1.01 * gamma) return start;  // nobody pays: no price matters
+  }
+  return start;
+}
+
+}  // namespace rotslam
