@@ -20,7 +20,8 @@ void WriteWhole(const std::filesystem::path& path,
                 std::string_view content) {
   std::FILE* file = std::fopen(temporary.c_str(), "wb");
   if (file == nullptr) Refuse(path, std::strerror(errno));
-  const bool wrote = std::fwrite(content.data(), 1, content.size(), file) == content.size();
+  const bool wrote =
+      content.empty() || std::fwrite(content.data(), 1, content.size(), file) == content.size();
   const int write_error = errno;
   const bool closed = std::fclose(file) == 0;
   if (!wrote) Refuse(path, std::strerror(write_error));

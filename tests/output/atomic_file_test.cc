@@ -19,6 +19,12 @@ TEST(ReplaceFile, LeavesTheContentAndNothingElse) {
   EXPECT_FALSE(std::filesystem::exists(folder.path() / "a.txt.tmp"));
 }
 
+TEST(ReplaceFile, TakesNoContent) {
+  const TemporaryFolder folder;
+  ReplaceFile(folder.path() / "a.txt", std::string_view());
+  EXPECT_TRUE(std::filesystem::is_empty(folder.path() / "a.txt"));
+}
+
 TEST(ReplaceFile, KeepsTheOldFileWhenWritingFails) {
   const TemporaryFolder folder;
   const auto path = folder.Write("a.txt", "old");
