@@ -4,6 +4,7 @@
 #include <cmath>
 #include <memory>
 #include <numbers>
+#include <sstream>
 #include <stdexcept>
 
 #include <Eigen/Geometry>
@@ -255,7 +256,9 @@ float Normal(std::uint64_t hash) {
 
 std::optional<std::string> RenderOptions::Problem() const {
   const auto range = [](const char* name, double value, const char* limit) {
-    return std::string(name) + " is " + std::to_string(value) + ", must be " + limit;
+    std::ostringstream text;
+    text << name << " is " << value << ", must be " << limit;
+    return text.str();
   };
   if (!(noise_grey >= 0.0 && noise_grey <= 100.0)) {
     return range("noise_grey", noise_grey, "in [0, 100]");

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <sstream>
 #include <stdexcept>
 
 #include "rotodom/types/parallel.h"
@@ -78,7 +79,9 @@ const char* Name(SimulationKind kind) {
 
 std::optional<std::string> SimulationOptions::Problem() const {
   const auto range = [](const char* name, double value, const char* limit) {
-    return std::string(name) + " is " + std::to_string(value) + ", must be " + limit;
+    std::ostringstream text;
+    text << name << " is " << value << ", must be " << limit;
+    return text.str();
   };
   if (frames < 0) return range("frames", frames, "at least 0 (0: all the path has)");
   if (kind == SimulationKind::kGimbal && frames > 0 && frames < 10) {
@@ -90,7 +93,7 @@ std::optional<std::string> SimulationOptions::Problem() const {
   if (!(speed_scale >= 1e-3 && speed_scale <= 1e3)) {
     return range("speed_scale", speed_scale, "in [0.001, 1000]");
   }
-  if (!(std::abs(turn_deg) <= 100000.0)) return range("turn_deg", turn_deg, "within +-100000");
+  if (!(std::abs(turn_deg) <= 3600.0)) return range("turn_deg", turn_deg, "within +-3600");
   if (!(std::abs(lever_arm_m) <= 0.4)) {
     return range("lever_arm_m", lever_arm_m, "within +-0.4, to stay clear of the furniture");
   }

@@ -159,7 +159,7 @@ TEST(Simulation, SamePointLooksTheSameFromTwoPlaces) {
 }
 
 TEST(RenderFrame, PixelIsTheAverageOverItsSquare) {
-  // The slow, obvious way: 6 x 6 rays a pixel, each with the texture of a sixth of its footprint.
+  // The slow, obvious way: 4 x 4 rays a pixel, each with the texture of a quarter of its footprint.
   Light flat;
   flat.ambient = 1.0f;
   flat.diffuse = 0.0f;
@@ -170,12 +170,12 @@ TEST(RenderFrame, PixelIsTheAverageOverItsSquare) {
   RenderOptions options;
   options.noise_grey = 0.0;
   options.exposure_variation = 0.0;
-  for (const int k : {0, 8, 10, 19}) {
+  for (const int k : {0, 10}) {
     const StampedPose& pose = room.Truth()[k];
     const cv::Mat image = RenderFrame(
         world, {}, PixelRays(camera), [&](double) { return pose; }, 0.0, 0, options);
     const auto mean_square = [&](double shift_x, double shift_y) {
-      constexpr int kRays = 6;
+      constexpr int kRays = 4;
       double sum = 0.0;
       for (int y = 0; y < camera.height; ++y) {
         for (int x = 0; x < camera.width; ++x) {
@@ -218,7 +218,7 @@ TEST(Simulation, OrbFindsThousandsOfCornersSpreadOverTheImage) {
     options.kind = kind;
     const Simulation simulation(options);
     const int last = simulation.NumFrames() - 1;
-    for (const int k : {0, last / 2, last}) {
+    for (const int k : {0, last}) {
       const cv::Mat image = simulation.Render(k);
       ASSERT_EQ(image.cols, 640);
       ASSERT_EQ(image.rows, 480);
@@ -244,15 +244,15 @@ TEST(Simulation, OrbFindsThousandsOfCornersSpreadOverTheImage) {
 TEST(Simulation, SameBytesAtAnyNumberOfThreads) {
   for (const SimulationKind kind : kKinds) {
     SimulationOptions options = Small(kind);
-    options.last = 5;
+    options.last = 2;
     options.distractors = 2;
     options.render.blur_subframes = 2;
     options.render.color = true;
     const SimulatedSequence one = RenderSequence(options, 1);
     const SimulatedSequence three = RenderSequence(options, 3);
-    ASSERT_EQ(one.images.size(), 6u);
-    ASSERT_EQ(three.images.size(), 6u);
-    for (int k = 0; k < 6; ++k) {
+    ASSERT_EQ(one.images.size(), 3u);
+    ASSERT_EQ(three.images.size(), 3u);
+    for (int k = 0; k < 3; ++k) {
       EXPECT_EQ(one.images[k].type(), CV_8UC3);
       EXPECT_EQ(cv::norm(one.images[k], three.images[k], cv::NORM_INF), 0.0) << Name(kind) << k;
     }
