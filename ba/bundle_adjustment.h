@@ -107,8 +107,7 @@ struct BundleResult {
 /// any `options.num_threads`.
 /// Error:   truth to 1e-6 of the path length on clean scenes (ba tests).
 /// Cost:    per iteration linear in observations plus a Cholesky of 6 unknowns per camera; three
-/// rounds of 67 cameras, 13,000 points and 84,000 observations take 2 s on one core, of 150, 30,000
-/// and 270,000 about 8 s.
+/// rounds of 67 cameras, 13,000 points and 84,000 observations take 2 to 3 s.
 /// Source:  Triggs et al., Bundle Adjustment - A Modern Synthesis, 1999; the chain of rounds is
 /// ours.
 BundleResult RefineBundle(const BundleProblem& problem, const BundleOptions& options);
