@@ -357,6 +357,9 @@ std::optional<std::string> RelativeRotationOptions::Problem() const {
     return "loss_sigmas = " + std::to_string(loss_sigmas) + ": must be positive";
   if (!(min_noise_px > 0.0))
     return "min_noise_px = " + std::to_string(min_noise_px) + ": must be positive";
+  if (!(shared_error_px >= 0.0)) {
+    return "shared_error_px = " + std::to_string(shared_error_px) + ": must be zero or more";
+  }
   if (sample_size < 5)
     return "sample_size = " + std::to_string(sample_size) + ": must be at least 5";
   if (!(confidence > 0.0 && confidence < 1.0)) {
@@ -416,7 +419,8 @@ std::optional<RelativeRotationEstimate> EstimateRelativeRotation(
 
   const RotationFit rotation =
       RefineRotation(pairs, epipolar.j_from_i, 2.0 * loss, options.refine_iterations);
-  const ModelChoice criterion = InformationCriterion(pairs, epipolar, rotation.j_from_i, noise);
+  const ModelChoice criterion = InformationCriterion(
+      pairs, epipolar, rotation.j_from_i, std::hypot(noise, options.shared_error_px / focal_px));
   estimate.rotation_only = criterion.rotation < criterion.epipolar;
   if (estimate.rotation_only) {
     estimate.j_from_i = rotation.j_from_i;
