@@ -27,6 +27,8 @@ using Action = std::function<int()>;
 void AddCommonFlags(CLI::App& command, CommonFlags& flags);
 
 // One file per subcommand. Each adds its subcommand to `app` and sets `action` once it is parsed.
+void AddRunCommand(CLI::App& app, Action& action);
+void AddRotationsCommand(CLI::App& app, Action& action);
 void AddSimulateCommand(CLI::App& app, Action& action);
 void AddEvalCommand(CLI::App& app, Action& action);
 

@@ -8,6 +8,10 @@ int main(int argc, char** argv) {
                "rotslam");
   app.require_subcommand(1);
   rotslam::Action action;
+  rotslam::AddRunCommand(app, action);
+  rotslam::AddRotationsCommand(app, action);
+  rotslam::AddEvalCommand(app, action);
+  rotslam::AddSimulateCommand(app, action);
   CLI11_PARSE(app, argc, argv);
   try {
     return action();

@@ -9,15 +9,26 @@ foreach(folder rotodom krot ba output)
     FILES_MATCHING PATTERN "*.h")
 endforeach()
 
+# Static libraries: who links them needs what they use, also where no header of ours shows it.
 file(CONFIGURE OUTPUT ${PROJECT_BINARY_DIR}/rotslamConfig.cmake @ONLY CONTENT [[
 include(CMakeFindDependencyMacro)
 find_dependency(Eigen3 3.4 NO_MODULE)
 find_dependency(Threads)
-find_dependency(OpenCV)
+find_dependency(OpenCV 4.5)
 find_dependency(yaml-cpp)
-find_dependency(Ceres)
+find_dependency(Ceres 2.1)
+find_dependency(nlohmann_json 3.10)
+list(PREPEND CMAKE_MODULE_PATH "${CMAKE_CURRENT_LIST_DIR}")
+find_dependency(PclIo)
+list(POP_FRONT CMAKE_MODULE_PATH)
+find_dependency(PkgConfig)
+pkg_check_modules(CLP REQUIRED IMPORTED_TARGET clp)
 include("${CMAKE_CURRENT_LIST_DIR}/rotslamTargets.cmake")
 ]])
 write_basic_package_version_file(${PROJECT_BINARY_DIR}/rotslamConfigVersion.cmake COMPATIBILITY SameMinorVersion)
-install(FILES ${PROJECT_BINARY_DIR}/rotslamConfig.cmake ${PROJECT_BINARY_DIR}/rotslamConfigVersion.cmake
+install(
+  FILES
+    ${PROJECT_BINARY_DIR}/rotslamConfig.cmake
+    ${PROJECT_BINARY_DIR}/rotslamConfigVersion.cmake
+    ${PROJECT_SOURCE_DIR}/cmake/FindPclIo.cmake
   DESTINATION ${CMAKE_INSTALL_LIBDIR}/cmake/rotslam)

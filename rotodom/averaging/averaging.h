@@ -15,7 +15,7 @@ struct AveragingOptions {
   // Standard deviation added to every edge's covariance: what the edges' own covariances do not
   // know of, calibration and rolling shutter first. Larger values make the edges' weights more
   // equal.
-  double edge_floor_deg = 0.05;
+  double edge_floor_deg = 0.2;
   // Edge error, in standard deviations, beyond which the robust (Geman-McClure) cost goes flat.
   double loss_sigmas = 3.0;
   // Stop when no orientation moves by more than this, and after max_iterations in any case.

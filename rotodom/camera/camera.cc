@@ -142,7 +142,7 @@ std::optional<Eigen::Vector2d> NewtonRadtan(const Camera& camera,
 std::optional<Eigen::Vector2d> UndistortRadtan(const Camera& camera,
                                                const Eigen::Vector2d& distorted) {
   const OddPolynomial radial(camera);
-  if (const auto point = NewtonRadtan(camera, radial, distorted, distorted)) return point;
+  if (auto point = NewtonRadtan(camera, radial, distorted, distorted)) return point;
   // Near the fold, or across a second branch: start from the radial part alone, solved exactly.
   const double radius = distorted.norm();
   const double start = radial.SolveOnFirstBranch(radius, kMaxRadius);

@@ -71,8 +71,10 @@ std::optional<std::int64_t> ParseInteger(std::string_view text) {
 
 // Whole and fractional part apart, so that no digit is lost before the last division.
 double SecondsFromTicks(std::int64_t ticks, std::int64_t ticks_per_second) {
-  return static_cast<double>(ticks / ticks_per_second) +
-         static_cast<double>(ticks % ticks_per_second) / static_cast<double>(ticks_per_second);
+  const std::int64_t seconds = ticks / ticks_per_second;
+  const std::int64_t rest = ticks % ticks_per_second;
+  return static_cast<double>(seconds) +
+         static_cast<double>(rest) / static_cast<double>(ticks_per_second);
 }
 
 std::string_view Trimmed(std::string_view text) {
@@ -244,6 +246,7 @@ Layout ListImageFolder(const fs::path& path, double fps) {
     Fail(layout.folder, "holds no images, and nothing that names a known data set layout");
   }
   std::vector<std::string> stems;
+  stems.reserve(files.size());
   for (const fs::path& file : files) stems.push_back(file.stem().string());
   const auto times_s = TimestampsFromNames(stems);
   for (std::size_t k = 0; k < files.size(); ++k) {

@@ -2,7 +2,10 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstdint>
 #include <fstream>
+#include <functional>
+#include <future>
 #include <iomanip>
 #include <iterator>
 #include <sstream>
@@ -13,6 +16,7 @@
 #include <opencv2/imgcodecs.hpp>
 #include <opencv2/imgproc.hpp>
 #include <opencv2/videoio.hpp>
+#include <opencv2/videoio/registry.hpp>
 
 #include "rotodom/sequence/layout.h"
 
@@ -38,11 +42,14 @@ cv::Mat ToEightBits(cv::Mat image, std::string& problem) {
   return {};
 }
 
-// A JPEG file that ends before its end marker decodes to grey below the break.
+// A JPEG file that ends before its end marker decodes to grey below the break. The marker must come
+// behind the start of the last scan: a thumbnail in the header has markers of its own.
 bool IsCutOffJpeg(const std::vector<unsigned char>& bytes) {
   if (bytes.size() < 4 || bytes[0] != 0xff || bytes[1] != 0xd8) return false;
-  const unsigned char kEnd[] = {0xff, 0xd9};
-  return std::find_end(bytes.begin(), bytes.end(), std::begin(kEnd), std::end(kEnd)) == bytes.end();
+  constexpr unsigned char kScan[] = {0xff, 0xda};
+  constexpr unsigned char kEnd[] = {0xff, 0xd9};
+  const auto scan = std::find_end(bytes.begin(), bytes.end(), std::begin(kScan), std::end(kScan));
+  return std::search(scan, bytes.end(), std::begin(kEnd), std::end(kEnd)) == bytes.end();
 }
 
 cv::Mat DecodeImage(const fs::path& file, std::string& problem) {
@@ -99,7 +106,8 @@ class FileSequence : public Sequence {
     ground_truth_file_ = std::move(layout.ground_truth_file);
     const int num_entries = static_cast<int>(layout.entries.size());
     if (options.first >= num_entries) FailBeyondEnd(place_, options.first, num_entries);
-    const int end = options.last < 0 ? num_entries : std::min(options.last + 1, num_entries);
+    const bool to_the_end = options.last < 0 || options.last >= num_entries;
+    const int end = to_the_end ? num_entries : options.last + 1;
     for (std::int64_t k = options.first; k < end; k += options.stride) {
       entries_.push_back(std::move(layout.entries[static_cast<std::size_t>(k)]));
       timestamps_s_.push_back(entries_.back().timestamp_s);
@@ -110,6 +118,17 @@ class FileSequence : public Sequence {
   }
 
  private:
+  struct Decoded {
+    cv::Mat image;
+    std::string problem;
+  };
+
+  static Decoded DecodeEntry(const ImageEntry& entry) {
+    Decoded decoded;
+    decoded.image = DecodeImage(entry.file, decoded.problem);
+    return decoded;
+  }
+
   void FindImageSize() {
     std::string first_problem;
     for (const ImageEntry& entry : entries_) {
@@ -133,13 +152,25 @@ class FileSequence : public Sequence {
     frame.id = FrameId{next_++};
     frame.timestamp_s = entry.timestamp_s;
     frame.name = entry.file.filename().string();
-    frame.image = DecodeImage(entry.file, frame.problem);
+    Decoded decoded = ahead_.valid() ? ahead_.get() : DecodeEntry(entry);
+    if (next_ < num_frames_) {
+      ahead_ = std::async(std::launch::async, DecodeEntry, std::cref(entries_[next_]));
+    }
+    frame.image = std::move(decoded.image);
+    frame.problem = std::move(decoded.problem);
     return frame;
   }
 
   std::vector<ImageEntry> entries_;
   int next_ = 0;
+  std::future<Decoded> ahead_;  // image next_, decoded while the caller works on the one before
 };
+
+// FFmpeg where OpenCV has it: with any other back end allowed, a file that is no video makes each
+// of them complain on stderr in turn.
+int VideoBackEnd() {
+  return cv::videoio_registry::hasBackend(cv::CAP_FFMPEG) ? cv::CAP_FFMPEG : cv::CAP_ANY;
+}
 
 class VideoSequence : public Sequence {
  public:
@@ -148,15 +179,15 @@ class VideoSequence : public Sequence {
     place_ = std::move(layout.folder);
     camera_file_ = std::move(layout.camera_file);
     Probe();
-    capture_.open(place_.string());
-    while (number_ < options.first) {
+    capture_.open(place_.string(), VideoBackEnd());
+    while (number_ <= options.first) {
       if (!Grab()) FailBeyondEnd(place_, options.first, number_);
     }
     const double claimed = capture_.get(cv::CAP_PROP_FRAME_COUNT);
     if (claimed > 0.0 && claimed < 1e9) {
-      int end = static_cast<int>(claimed);
-      if (options.last >= 0) end = std::min(end, options.last + 1);
-      num_frames_ = std::max(0, (end - options.first + options.stride - 1) / options.stride);
+      int last = static_cast<int>(claimed) - 1;
+      if (options.last >= 0) last = std::min(last, options.last);
+      num_frames_ = std::max(0, last - options.first) / options.stride + 1;
     }
   }
 
@@ -164,7 +195,7 @@ class VideoSequence : public Sequence {
   // Reads the first frames once: is there a picture, and do their timestamps increase?
   void Probe() {
     constexpr int kProbedFrames = 10;
-    cv::VideoCapture capture(place_.string());
+    cv::VideoCapture capture(place_.string(), VideoBackEnd());
     if (!capture.isOpened()) {
       throw std::runtime_error(place_.string() + ": not a video that OpenCV can open");
     }
@@ -194,11 +225,17 @@ class VideoSequence : public Sequence {
     return true;
   }
 
+  // Steps to the next frame to give; false after the last. The first one is there from the start.
+  bool Advance() {
+    if (timestamps_s_.empty()) return true;
+    const bool beyond_last = options_.last >= 0 && number_ - 1 > options_.last - options_.stride;
+    if (ended_ || beyond_last) return false;
+    for (int k = 0; k < options_.stride && !ended_; ++k) ended_ = !Grab();
+    return !ended_;
+  }
+
   std::optional<Frame> Decode() override {
-    const int num_skipped = timestamps_s_.empty() ? 0 : options_.stride - 1;
-    bool there = options_.last < 0 || number_ + num_skipped <= options_.last;
-    for (int k = 0; k <= num_skipped && there; ++k) there = Grab();
-    if (!there) {
+    if (!Advance()) {
       num_frames_ = static_cast<int>(timestamps_s_.size());
       return std::nullopt;
     }
@@ -222,6 +259,7 @@ class VideoSequence : public Sequence {
   SequenceOptions options_;
   cv::VideoCapture capture_;
   bool has_timestamps_ = true;
+  bool ended_ = false;
   int number_ = 0;       // frames of the file grabbed so far
   double time_s_ = 0.0;  // of the frame grabbed last
 };

@@ -1,0 +1,173 @@
+#include "apps/config.h"
+
+#include <algorithm>
+#include <cmath>
+#include <map>
+#include <numeric>
+#include <set>
+#include <string_view>
+#include <type_traits>
+
+#include <yaml-cpp/yaml.h>
+
+#include "output/text_file.h"
+
+namespace rotslam {
+namespace {
+
+// Insertions, deletions and replacements that turn `a` into `b` (Levenshtein).
+std::size_t EditDistance(std::string_view a, std::string_view b) {
+  std::vector<std::size_t> row(b.size() + 1);
+  std::iota(row.begin(), row.end(), std::size_t{0});
+  for (std::size_t i = 0; i < a.size(); ++i) {
+    std::size_t diagonal = row[0];
+    row[0] = i + 1;
+    for (std::size_t j = 0; j < b.size(); ++j) {
+      const std::size_t replaced = diagonal + (a[i] == b[j] ? 0 : 1);
+      diagonal = row[j + 1];
+      row[j + 1] = std::min({replaced, row[j] + 1, row[j + 1] + 1});
+    }
+  }
+  return row.back();
+}
+
+std::string LastPart(const std::string& key) { return key.substr(key.rfind('.') + 1); }
+
+// Right name in the wrong group is one step more than right name, whatever the group is called.
+std::size_t KeyDistance(const std::string& key, const std::string& known) {
+  return std::min(EditDistance(key, known), EditDistance(LastPart(key), LastPart(known)) + 1);
+}
+
+// What OverrideOptions knows about its keys: options, and the groups they lie in.
+struct Vocabulary {
+  std::map<std::string, const OptionRef*> option_of;
+  std::set<std::string> groups;
+  std::vector<std::string> keys;  // of the options, in their order
+
+  explicit Vocabulary(const std::vector<OptionRef>& options) {
+    for (const OptionRef& option : options) {
+      option_of[option.key] = &option;
+      keys.push_back(option.key);
+      for (std::size_t dot = option.key.find('.'); dot != std::string::npos;
+           dot = option.key.find('.', dot + 1)) {
+        groups.insert(option.key.substr(0, dot));
+      }
+    }
+  }
+
+  std::string Nearest(const std::string& key) const {
+    std::vector<std::string> candidates = keys;
+    candidates.insert(candidates.end(), groups.begin(), groups.end());
+    const auto nearest = std::min_element(
+        candidates.begin(), candidates.end(), [&](const std::string& a, const std::string& b) {
+          return KeyDistance(key, a) < KeyDistance(key, b);
+        });
+    return nearest == candidates.end() ? std::string() : *nearest;
+  }
+};
+
+std::string Shown(const YAML::Node& node) {
+  if (node.IsNull()) return "nothing";
+  if (node.IsSequence()) return "a list";
+  if (node.IsMap()) return "a map";
+  return "\"" + node.Scalar() + "\"";
+}
+
+template <class Field>
+std::string Expected() {
+  if constexpr (std::is_same_v<Field, bool>) return "true or false";
+  if constexpr (std::is_same_v<Field, int>) return "a whole number";
+  if constexpr (std::is_same_v<Field, std::uint64_t>) return "a whole number from 0";
+  if constexpr (std::is_same_v<Field, double>) return "a number";
+  return "text";
+}
+
+template <class Field>
+bool Assign(const YAML::Node& node, Field& field) {
+  if (!node.IsScalar()) return false;
+  if constexpr (std::is_unsigned_v<Field> && !std::is_same_v<Field, bool>) {
+    if (node.Scalar().starts_with('-')) return false;
+  }
+  Field value;
+  if (!YAML::convert<Field>::decode(node, value)) return false;
+  if constexpr (std::is_same_v<Field, double>) {
+    if (std::isnan(value)) return false;
+  }
+  field = std::move(value);
+  return true;
+}
+
+class Loader {
+ public:
+  Loader(const std::filesystem::path& path, const Vocabulary& vocabulary)
+      : path_(path), vocabulary_(vocabulary) {}
+
+  void LoadGroup(const YAML::Node& map, const std::string& group) const {
+    std::set<std::string> seen;
+    for (const auto& entry : map) {
+      if (!entry.first.IsScalar()) Refuse(entry.first, "an option's name cannot be a list or map");
+      const std::string key =
+          group.empty() ? entry.first.Scalar() : group + "." + entry.first.Scalar();
+      if (!seen.insert(key).second) Refuse(entry.first, "\"" + key + "\" stands here twice");
+      LoadEntry(entry.first, entry.second, key);
+    }
+  }
+
+  [[noreturn]] void Refuse(const YAML::Node& node, const std::string& reason) const {
+    throw std::runtime_error(AtLine(path_, node.Mark().line + 1, reason));
+  }
+
+ private:
+  void LoadEntry(const YAML::Node& name, const YAML::Node& value, const std::string& key) const {
+    if (vocabulary_.groups.contains(key)) {
+      if (value.IsNull()) return;
+      if (!value.IsMap()) {
+        Refuse(name, "\"" + key + "\" is a group of options, found " + Shown(value));
+      }
+      LoadGroup(value, key);
+      return;
+    }
+    const auto option = vocabulary_.option_of.find(key);
+    if (option == vocabulary_.option_of.end()) {
+      const std::string nearest = vocabulary_.Nearest(key);
+      Refuse(name,
+             "no option is called \"" + key + "\"" +
+                 (nearest.empty() ? "" : "; the nearest one is \"" + nearest + "\""));
+    }
+    std::visit(
+        [&](auto* field) {
+          using Field = std::remove_pointer_t<decltype(field)>;
+          if (!Assign(value, *field)) {
+            Refuse(name,
+                   "\"" + key + "\" expects " + Expected<Field>() + ", found " + Shown(value));
+          }
+        },
+        option->second->field);
+  }
+
+  const std::filesystem::path& path_;
+  const Vocabulary& vocabulary_;
+};
+
+YAML::Node ReadYaml(const std::filesystem::path& path) {
+  try {
+    return YAML::LoadFile(path.string());
+  } catch (const YAML::BadFile&) {
+    throw std::runtime_error(path.string() + ": cannot read the options file");
+  } catch (const YAML::ParserException& error) {
+    throw std::runtime_error(AtLine(path, error.mark.line + 1, "not YAML: " + error.msg));
+  }
+}
+
+}  // namespace
+
+void OverrideOptions(const std::filesystem::path& path, const std::vector<OptionRef>& options) {
+  const YAML::Node root = ReadYaml(path);
+  if (!root.IsDefined() || root.IsNull()) return;
+  const Vocabulary vocabulary(options);
+  const Loader loader(path, vocabulary);
+  if (!root.IsMap()) loader.Refuse(root, "expected options as `name: value`");
+  loader.LoadGroup(root, "");
+}
+
+}  // namespace rotslam

@@ -1,0 +1,40 @@
+#pragma once
+
+#include <memory>
+#include <string>
+
+#include "apps/command.h"
+#include "rotodom/camera/camera.h"
+#include "rotodom/sequence/sequence.h"
+
+namespace rotslam {
+
+/// What `run` and `rotations` take.
+struct InputFlags {
+  std::string sequence;
+  std::string camera;
+  std::string out;
+  // Set: override the configuration.
+  std::optional<int> first;
+  std::optional<int> last;
+  std::optional<int> stride;
+  std::optional<double> fps;
+
+  void Override(SequenceOptions& options) const;
+};
+
+void AddInputFlags(CLI::App& command, InputFlags& flags);
+
+struct Input {
+  std::unique_ptr<Sequence> sequence;
+  Camera camera;  // with the size of the images
+  std::string camera_file;
+};
+
+/// Opens the sequence, reads its camera (`flags.camera`, else what lies with the images) and says
+/// what was understood through `tell`. Throws std::runtime_error with one clear line.
+Input OpenInput(const InputFlags& flags,
+                const SequenceOptions& options,
+                const std::function<void(const std::string&)>& tell);
+
+}  // namespace rotslam

@@ -1,0 +1,92 @@
+#include "apps/orientations.h"
+
+#include <iterator>
+#include <stdexcept>
+
+namespace rotslam {
+namespace {
+
+// Orientations of frames without edges, from their neighbours in time that have some.
+void InterpolateUnconnected(Orientations& orientations) {
+  const auto connected = [&](FrameId frame) { return !orientations.graph.EdgesOf(frame).empty(); };
+  RotationMap& rotations = orientations.cam_from_world;
+  for (auto entry = rotations.begin(); entry != rotations.end(); ++entry) {
+    if (connected(entry->first)) continue;
+    auto before = entry;
+    while (before != rotations.begin() && !connected(before->first)) --before;
+    auto after = entry;
+    while (after != rotations.end() && !connected(after->first)) ++after;
+    const bool has_before = connected(before->first);
+    if (has_before && after != rotations.end()) {
+      const double from_s = orientations.timestamps_s[before->first.value];
+      const double to_s = orientations.timestamps_s[after->first.value];
+      const double at_s = orientations.timestamps_s[entry->first.value];
+      entry->second = Interpolate(before->second, after->second, (at_s - from_s) / (to_s - from_s));
+    } else if (has_before) {
+      entry->second = before->second;
+    } else if (after != rotations.end()) {
+      entry->second = after->second;
+    }
+  }
+}
+
+}  // namespace
+
+Orientations FindOrientations(Input& input,
+                              const OdometryOptions& options,
+                              const CommonFlags& flags,
+                              Progress& progress) {
+  RotationalOdometry odometry(input.camera, options, flags.seed, flags.NumThreads());
+  Orientations orientations;
+  progress.StartStage("orientations", input.sequence->NumFrames());
+  while (const std::optional<Frame> frame = input.sequence->Next()) {
+    if (frame->image.empty()) {
+      progress.Warn("frame " + std::to_string(frame->id.value) +
+                    " skipped, its pose is interpolated: " + frame->problem);
+      ++orientations.num_unreadable;
+    }
+    const FrameReport report = odometry.AddFrame(frame->id, frame->timestamp_s, frame->image);
+    orientations.timestamps_s.push_back(frame->timestamp_s);
+    orientations.num_weak += report.weak;
+    progress.Step(frame->id.value + 1, std::to_string(report.num_inliers) + " inliers");
+  }
+  orientations.cam_from_world = odometry.cam_from_world();
+  orientations.graph = odometry.graph();
+  orientations.edge_matches = odometry.edge_matches();
+  orientations.features = odometry.features();
+
+  const int num_frames = static_cast<int>(orientations.timestamps_s.size());
+  if (num_frames < 3) {
+    throw std::runtime_error("only " + std::to_string(num_frames) +
+                             " frames could be read; at least 3 are needed");
+  }
+  if (orientations.graph.edges().empty()) {
+    throw std::runtime_error(
+        "no two of the " + std::to_string(num_frames) +
+        " frames could be matched: the images show too few corners in common; check "
+        "that they are in focus, exposed and in order");
+  }
+  for (const auto& [frame, rotation] : orientations.cam_from_world) {
+    orientations.num_predicted += orientations.graph.EdgesOf(frame).empty();
+  }
+  InterpolateUnconnected(orientations);
+  progress.EndStage(std::to_string(num_frames) + " frames, " +
+                    std::to_string(orientations.graph.edges().size()) + " edges");
+  if (orientations.num_predicted > 0) {
+    progress.Warn(std::to_string(orientations.num_predicted) +
+                  " frames match no other; their orientations are interpolated");
+  }
+  return orientations;
+}
+
+Trajectory RotationTrajectory(const Orientations& orientations) {
+  Trajectory trajectory;
+  for (const auto& [frame, cam_from_world] : orientations.cam_from_world) {
+    trajectory.push_back({orientations.timestamps_s[frame.value],
+                          cam_from_world.Inverse(),
+                          Eigen::Vector3d::Zero()});
+  }
+  return trajectory;
+}
+
+}  // namespace rotslam

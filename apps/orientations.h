@@ -1,0 +1,35 @@
+#pragma once
+
+#include <vector>
+
+#include "apps/input.h"
+#include "apps/progress.h"
+#include "rotodom/odometry.h"
+#include "rotodom/types/trajectory.h"
+
+namespace rotslam {
+
+/// What the first stage knows once the sequence has been read.
+struct Orientations {
+  std::vector<double> timestamps_s;  // by frame id
+  RotationMap cam_from_world;        // of every frame
+  ViewGraph graph;
+  std::vector<EdgeMatches> edge_matches;
+  std::map<FrameId, Features> features;
+  int num_unreadable = 0;
+  int num_predicted = 0;  // frames without an edge; their orientations are interpolated
+  int num_weak = 0;
+};
+
+/// Reads the sequence to its end and finds every frame's orientation. Frames that could not be
+/// matched get theirs by interpolation in time between the nearest frames that could. Throws
+/// std::runtime_error when there are fewer than three frames or no two of them match.
+Orientations FindOrientations(Input& input,
+                              const OdometryOptions& options,
+                              const CommonFlags& flags,
+                              Progress& progress);
+
+/// Camera->world poses from orientations alone, positions zero.
+Trajectory RotationTrajectory(const Orientations& orientations);
+
+}  // namespace rotslam

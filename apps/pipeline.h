@@ -1,0 +1,43 @@
+#pragma once
+
+#include <optional>
+#include <string>
+
+#include "ba/bundle_adjustment.h"
+#include "ba/resection.h"
+#include "krot/held_stretches.h"
+#include "krot/known_rotation.h"
+#include "rotodom/odometry.h"
+#include "rotodom/sequence/sequence.h"
+#include "rotodom/tracks/keyframes.h"
+
+namespace rotslam {
+
+/// All that `rotslam run` can be told, stage by stage. The defaults run a real sequence untouched.
+struct PipelineOptions {
+  SequenceOptions sequence;
+  OdometryOptions rotodom;
+  HeldStretchOptions held_stretches;
+  KeyframeOptions keyframes;
+  KrotOptions krot;
+  BundleOptions ba;
+  ResectionOptions resection;
+  // Points whose rays meet at less than this stay out of the cloud: their depth is noise.
+  double cloud_min_angle_deg = 1.0;
+
+  std::optional<std::string> Problem() const;
+
+  template <class Visitor>
+  void Visit(Visitor&& visit) {
+    visit("sequence", sequence);
+    visit("rotodom", rotodom);
+    visit("held_stretches", held_stretches);
+    visit("keyframes", keyframes);
+    visit("krot", krot);
+    visit("ba", ba);
+    visit("resection", resection);
+    visit("cloud_min_angle_deg", cloud_min_angle_deg);
+  }
+};
+
+}  // namespace rotslam

@@ -1,0 +1,331 @@
+#include "apps/positions.h"
+
+#include <algorithm>
+#include <iterator>
+
+#include "rotodom/types/parallel.h"
+
+namespace rotslam {
+namespace {
+
+// How many frames on each side of a seam tell the speed there.
+constexpr int kSpeedFrames = 30;
+
+std::set<FrameId> AllFrames(const RotationMap& rotations) {
+  std::set<FrameId> frames;
+  for (const auto& [frame, rotation] : rotations) frames.insert(frame);
+  return frames;
+}
+
+const HeldStretch* StretchAt(const std::vector<HeldStretch>& held, FrameId frame) {
+  const auto stretch = std::find_if(held.begin(), held.end(), [&](const HeldStretch& s) {
+    return s.first <= frame && frame <= s.last;
+  });
+  return stretch == held.end() ? nullptr : &*stretch;
+}
+
+// Keyframes of each component of the known-rotation solution, by first keyframe.
+std::vector<MapComponent> ComponentsOf(const KrotSolution& krot) {
+  std::map<int, MapComponent> by_number;
+  for (const auto& [frame, number] : krot.component) {
+    if (krot.center_in_world.contains(frame)) by_number[number].keyframes.insert(frame);
+  }
+  std::vector<MapComponent> components;
+  for (auto& [number, component] : by_number) {
+    if (component.keyframes.size() >= 2) components.push_back(std::move(component));
+  }
+  std::sort(components.begin(), components.end(), [](const MapComponent& a, const MapComponent& b) {
+    return *a.keyframes.begin() < *b.keyframes.begin();
+  });
+  return components;
+}
+
+// Bundle adjustment of one component, in its own scale.
+BundleResult RefineComponent(const MapComponent& component,
+                             const RotationMap& rotations,
+                             const KrotSolution& krot,
+                             const std::vector<Track>& tracks,
+                             const std::vector<HeldStretch>& held,
+                             const Camera& camera,
+                             const BundleOptions& options) {
+  BundleProblem problem;
+  problem.camera = camera;
+  for (const FrameId frame : component.keyframes) {
+    problem.start.cam_from_world[frame] = rotations.at(frame);
+    problem.start.center_in_world[frame] = krot.center_in_world.at(frame);
+  }
+  for (const HeldStretch& stretch : held) {
+    if (component.keyframes.contains(stretch.first) && component.keyframes.contains(stretch.last)) {
+      problem.shared_center[stretch.last] = stretch.first;
+    }
+  }
+  problem.start.tracks = RestrictTracks(tracks, component.keyframes, 2);
+  return RefineBundle(problem, options);
+}
+
+// x_new = scale * turn * x_old + shift.
+struct Similarity {
+  double scale = 1.0;
+  Rotation turn;
+  Eigen::Vector3d shift = Eigen::Vector3d::Zero();
+};
+
+Reconstruction Moved(const Reconstruction& part, const Similarity& similarity) {
+  const auto move = [&](const Eigen::Vector3d& position) -> Eigen::Vector3d {
+    return similarity.scale * (similarity.turn * position) + similarity.shift;
+  };
+  Reconstruction moved = part;
+  for (auto& [frame, rotation] : moved.cam_from_world)
+    rotation = rotation * similarity.turn.Inverse();
+  for (auto& [frame, center] : moved.center_in_world) center = move(center);
+  for (auto& [track, point] : moved.point_in_world) point = move(point);
+  return moved;
+}
+
+struct Motion {
+  Eigen::Vector3d velocity =
+      Eigen::Vector3d::Zero();  // median speed, direction of the nearest step
+  double speed = 0.0;
+};
+
+// Speed of the part near the seam: over the keyframes within kSpeedFrames of its last (or first)
+// one.
+Motion MotionAtSeam(const CenterMap& centers,
+                    const std::vector<double>& timestamps_s,
+                    bool at_end) {
+  std::vector<std::pair<FrameId, Eigen::Vector3d>> path(centers.begin(), centers.end());
+  if (at_end) std::reverse(path.begin(), path.end());
+  std::vector<double> speeds;
+  Motion motion;
+  for (std::size_t k = 1; k < path.size(); ++k) {
+    if (std::abs(path[k].first.value - path.front().first.value) > kSpeedFrames && !speeds.empty())
+      break;
+    const double seconds =
+        std::abs(timestamps_s[path[k].first.value] - timestamps_s[path[k - 1].first.value]);
+    const Eigen::Vector3d step = at_end ? Eigen::Vector3d(path[k - 1].second - path[k].second)
+                                        : Eigen::Vector3d(path[k].second - path[k - 1].second);
+    if (!(seconds > 0.0) || step.norm() == 0.0) continue;
+    if (speeds.empty()) motion.velocity = step.normalized();
+    speeds.push_back(step.norm() / seconds);
+  }
+  if (speeds.empty()) return motion;
+  std::sort(speeds.begin(), speeds.end());
+  motion.speed = speeds[speeds.size() / 2];
+  motion.velocity *= motion.speed;
+  return motion;
+}
+
+// Where and how large `part` goes behind `placed`, by continuity. `rotations` are those of all
+// frames, the placed ones refined.
+Similarity PlaceBehind(const Reconstruction& placed,
+                       const Reconstruction& part,
+                       const RotationMap& rotations,
+                       const std::vector<double>& timestamps_s,
+                       const std::vector<HeldStretch>& held) {
+  const FrameId first = part.center_in_world.begin()->first;
+  // The last placed keyframe before the part begins.
+  CenterMap earlier = placed.center_in_world;
+  std::erase_if(earlier, [&](const auto& entry) { return entry.first >= first; });
+  if (earlier.empty()) earlier = placed.center_in_world;
+  const FrameId last = earlier.rbegin()->first;
+
+  Similarity similarity;
+  similarity.turn = rotations.at(first).Inverse() * part.cam_from_world.at(first);
+  const Motion before = MotionAtSeam(earlier, timestamps_s, true);
+  const Motion after = MotionAtSeam(part.center_in_world, timestamps_s, false);
+  if (before.speed > 0.0 && after.speed > 0.0) similarity.scale = before.speed / after.speed;
+
+  Eigen::Vector3d start = earlier.rbegin()->second;
+  const HeldStretch* stretch = StretchAt(held, first);
+  const bool is_held = stretch != nullptr && StretchAt(held, last) == stretch;
+  if (!is_held) start += before.velocity * (timestamps_s[first.value] - timestamps_s[last.value]);
+  similarity.shift = start - similarity.scale * (similarity.turn * part.center_in_world.at(first));
+  return similarity;
+}
+
+void Append(Reconstruction& map, Reconstruction part) {
+  map.cam_from_world.insert(part.cam_from_world.begin(), part.cam_from_world.end());
+  map.center_in_world.insert(part.center_in_world.begin(), part.center_in_world.end());
+  map.point_in_world.insert(part.point_in_world.begin(), part.point_in_world.end());
+  std::move(part.tracks.begin(), part.tracks.end(), std::back_inserter(map.tracks));
+}
+
+// The orientations that the map does not hold follow those that it does.
+RotationMap FollowMap(const ViewGraph& graph,
+                      RotationMap rotations,
+                      const RotationMap& refined,
+                      const AveragingOptions& options) {
+  std::set<FrameId> free_views = AllFrames(rotations);
+  for (const auto& [frame, rotation] : refined) {
+    rotations[frame] = rotation;
+    free_views.erase(frame);
+  }
+  return AverageRotations(graph, std::move(rotations), free_views, options);
+}
+
+// Position between the nearest frames that have one, linear in time.
+Eigen::Vector3d InterpolatedCenter(const CenterMap& centers,
+                                   const std::vector<double>& timestamps_s,
+                                   FrameId frame) {
+  const auto after = centers.lower_bound(frame);
+  if (after == centers.end()) return centers.rbegin()->second;
+  if (after->first == frame || after == centers.begin()) return after->second;
+  const auto before = std::prev(after);
+  const double from_s = timestamps_s[before->first.value];
+  const double to_s = timestamps_s[after->first.value];
+  const double weight = (timestamps_s[frame.value] - from_s) / (to_s - from_s);
+  return (1.0 - weight) * before->second + weight * after->second;
+}
+
+// Poses of the frames that the map does not hold.
+void PlaceRemainingFrames(const std::vector<Track>& all_tracks,
+                          const std::vector<double>& timestamps_s,
+                          const Camera& camera,
+                          const ResectionOptions& options,
+                          int num_threads,
+                          PositionResult& result) {
+  const CenterMap anchors = result.map.center_in_world;
+  result.center_in_world = anchors;
+  std::vector<FrameId> remaining;
+  for (const auto& [frame, rotation] : result.cam_from_world) {
+    if (anchors.contains(frame)) continue;
+    // Inside a stretch the place is that of its ends, to the last bit.
+    const HeldStretch* stretch = StretchAt(result.held, frame);
+    if (stretch != nullptr &&
+        (anchors.contains(stretch->first) || anchors.contains(stretch->last))) {
+      const FrameId end = anchors.contains(stretch->first) ? stretch->first : stretch->last;
+      result.center_in_world[frame] = anchors.at(end);
+    } else {
+      remaining.push_back(frame);
+    }
+  }
+
+  std::map<FrameId, std::vector<PointSighting>> sightings;
+  for (const Track& track : all_tracks) {
+    const auto point = result.map.point_in_world.find(track.id);
+    if (point == result.map.point_in_world.end()) continue;
+    for (const Observation& observation : track.observations) {
+      sightings[observation.frame].push_back(
+          {point->second, observation.keypoint_px, observation.sigma_px});
+    }
+  }
+  std::vector<std::optional<ResectedPose>> poses(remaining.size());
+  static const std::vector<PointSighting> kNone;
+  ParallelFor(static_cast<int>(remaining.size()), num_threads, [&](int k) {
+    const FrameId frame = remaining[k];
+    const auto seen = sightings.find(frame);
+    const ResectionStart start{result.cam_from_world.at(frame),
+                               InterpolatedCenter(anchors, timestamps_s, frame),
+                               std::nullopt};
+    poses[k] = ResectFrame(camera, seen == sightings.end() ? kNone : seen->second, start, options);
+  });
+  for (std::size_t k = 0; k < remaining.size(); ++k) {
+    if (poses[k]) {
+      result.cam_from_world[remaining[k]] = poses[k]->cam_from_world;
+      result.center_in_world[remaining[k]] = poses[k]->center_in_world;
+      ++result.num_resected;
+    }
+  }
+  const CenterMap known = result.center_in_world;
+  for (std::size_t k = 0; k < remaining.size(); ++k) {
+    if (poses[k]) continue;
+    result.center_in_world[remaining[k]] = InterpolatedCenter(known, timestamps_s, remaining[k]);
+    ++result.num_interpolated;
+  }
+}
+
+// No map: every frame stands at the origin.
+PositionResult WithoutMap(PositionResult result, std::string message) {
+  for (const auto& [frame, rotation] : result.cam_from_world) {
+    result.center_in_world[frame] = Eigen::Vector3d::Zero();
+  }
+  result.message = std::move(message);
+  return result;
+}
+
+}  // namespace
+
+PositionResult FindPositions(const Orientations& orientations,
+                             const Camera& camera,
+                             const PipelineOptions& options,
+                             int num_threads,
+                             Progress& progress) {
+  PositionResult result;
+  result.cam_from_world = orientations.cam_from_world;
+
+  progress.StartStage("tracks", -1);
+  const std::vector<Track> all_tracks = BuildTracks(
+      orientations.edge_matches, orientations.features, AllFrames(result.cam_from_world), 2);
+  result.held =
+      FindHeldStretches(orientations.graph, result.cam_from_world, options.held_stretches);
+  result.keyframes =
+      SelectKeyframes(result.cam_from_world, all_tracks, result.held, options.keyframes);
+  const std::vector<Track> tracks = RestrictTracks(all_tracks, result.keyframes, 3);
+  progress.EndStage(std::to_string(result.keyframes.size()) + " keyframes, " +
+                    std::to_string(tracks.size()) + " tracks, " +
+                    std::to_string(result.held.size()) + " pure-rotation stretches");
+  const HeldStretch* everything = StretchAt(result.held, result.cam_from_world.begin()->first);
+  if (everything != nullptr && everything->last == result.cam_from_world.rbegin()->first) {
+    return WithoutMap(std::move(result),
+                      "the camera only rotates, so there are no positions and no points to find");
+  }
+
+  progress.StartStage("known rotation", -1);
+  RotationMap keyframe_rotations;
+  for (const FrameId frame : result.keyframes)
+    keyframe_rotations[frame] = result.cam_from_world.at(frame);
+  KrotOptions krot_options = options.krot;
+  krot_options.num_threads = num_threads;
+  result.krot = SolveKnownRotation(keyframe_rotations, tracks, camera, krot_options);
+  progress.EndStage(result.krot.message);
+  if (!result.krot.Usable()) return WithoutMap(std::move(result), result.krot.message);
+
+  progress.StartStage("bundle adjustment", -1);
+  BundleOptions bundle_options = options.ba;
+  bundle_options.num_threads = num_threads;
+  for (MapComponent& component : ComponentsOf(result.krot)) {
+    BundleResult bundle = RefineComponent(
+        component, result.cam_from_world, result.krot, tracks, result.held, camera, bundle_options);
+    if (!bundle.Usable() || bundle.reconstruction.center_in_world.size() < 2) continue;
+    if (!result.components.empty()) {
+      component.placed_by_default = true;
+      bundle.reconstruction = Moved(bundle.reconstruction,
+                                    PlaceBehind(result.map,
+                                                bundle.reconstruction,
+                                                result.cam_from_world,
+                                                orientations.timestamps_s,
+                                                result.held));
+    }
+    Append(result.map, std::move(bundle.reconstruction));
+    result.bundles.push_back(std::move(bundle.summary));
+    result.components.push_back(std::move(component));
+    result.cam_from_world = FollowMap(orientations.graph,
+                                      std::move(result.cam_from_world),
+                                      result.map.cam_from_world,
+                                      options.rotodom.averaging);
+  }
+  if (result.components.empty()) {
+    return WithoutMap(std::move(result), "bundle adjustment found no usable map");
+  }
+  progress.EndStage(std::to_string(result.map.point_in_world.size()) + " points, mean error " +
+                    std::to_string(result.bundles.front().after.mean_px) + " px");
+
+  progress.StartStage("frames between keyframes", -1);
+  PlaceRemainingFrames(
+      all_tracks, orientations.timestamps_s, camera, options.resection, num_threads, result);
+  progress.EndStage(std::to_string(result.num_resected) + " resected, " +
+                    std::to_string(result.num_interpolated) + " interpolated");
+  return result;
+}
+
+Trajectory MakeTrajectory(const std::vector<double>& timestamps_s,
+                          const RotationMap& cam_from_world,
+                          const CenterMap& centers) {
+  Trajectory trajectory;
+  for (const auto& [frame, center] : centers) {
+    trajectory.push_back({timestamps_s[frame.value], cam_from_world.at(frame).Inverse(), center});
+  }
+  return trajectory;
+}
+
+}  // namespace rotslam

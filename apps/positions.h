@@ -1,0 +1,50 @@
+#pragma once
+
+#include <set>
+#include <string>
+#include <vector>
+
+#include "apps/orientations.h"
+#include "apps/pipeline.h"
+
+namespace rotslam {
+
+/// Keyframes whose relative scale is known: they share tracks with depth.
+struct MapComponent {
+  std::set<FrameId> keyframes;
+  bool placed_by_default = false;  // its scale and place rest on continuity, not on measurements
+};
+
+/// Positions and points, and how they came about.
+struct PositionResult {
+  RotationMap cam_from_world;  // of every frame
+  CenterMap center_in_world;   // of every frame
+  Reconstruction map;          // refined keyframes, points and their tracks
+  std::set<FrameId> keyframes;
+  std::vector<HeldStretch> held;
+  std::vector<MapComponent> components;  // by their first keyframe
+  KrotSolution krot;
+  std::vector<BundleSummary> bundles;  // one per component
+  int num_resected = 0;
+  int num_interpolated = 0;  // frames between keyframes whose position is interpolated
+  std::string message;       // why there is no map; empty when there is one
+};
+
+/// From orientations to positions and points: keyframes and tracks, the known-rotation problem,
+/// bundle adjustment, then the frames between keyframes.
+///
+/// Parts of the map that no track with depth links keep their own scale (`components`). They are
+/// put together by continuity: the later part starts where the earlier one ends, or as far on as
+/// its last velocity carries, and moves as fast (median over up to 30 frames on each side).
+PositionResult FindPositions(const Orientations& orientations,
+                             const Camera& camera,
+                             const PipelineOptions& options,
+                             int num_threads,
+                             Progress& progress);
+
+/// Camera->world poses of all frames of `centers`.
+Trajectory MakeTrajectory(const std::vector<double>& timestamps_s,
+                          const RotationMap& cam_from_world,
+                          const CenterMap& centers);
+
+}  // namespace rotslam

@@ -1,0 +1,56 @@
+#include <chrono>
+#include <memory>
+
+#include "apps/command.h"
+#include "apps/config.h"
+#include "apps/orientations.h"
+#include "apps/pipeline.h"
+#include "apps/progress.h"
+#include "apps/run_directory.h"
+
+namespace rotslam {
+namespace {
+
+struct RotationsFlags {
+  CommonFlags common;
+  InputFlags input;
+};
+
+int FindAndWriteRotations(const RotationsFlags& flags) {
+  const auto start = std::chrono::steady_clock::now();
+  Progress progress(flags.common.quiet);
+  // The whole pipeline's options, so that one configuration file serves `run` and `rotations`.
+  PipelineOptions options;
+  if (!flags.common.config.empty()) LoadOptionsYaml(flags.common.config, options);
+  flags.input.Override(options.sequence);
+
+  Input input = OpenInput(
+      flags.input, options.sequence, [&](const std::string& line) { progress.Say(line); });
+  const std::filesystem::path directory = PrepareRunDirectory(flags.input.out);
+  const Orientations orientations =
+      FindOrientations(input, options.rotodom, flags.common, progress);
+  WriteOrientations(directory, orientations);
+  RunSummary summary = StartSummary("rotations", input, orientations, DescribeOptions(options));
+  summary.seconds = {
+      {"total", std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count()}};
+  WriteSummary(directory / "summary.json", summary);
+  progress.Say("wrote " + (directory / "rotations_tum.txt").string() +
+               ", view_graph.g2o, summary.json");
+  return 0;
+}
+
+}  // namespace
+
+void AddRotationsCommand(CLI::App& app, Action& action) {
+  const auto flags = std::make_shared<RotationsFlags>();
+  CLI::App* command = app.add_subcommand(
+      "rotations",
+      "Every frame's orientation from a sequence, without positions (rotational odometry)");
+  AddInputFlags(*command, flags->input);
+  AddCommonFlags(*command, flags->common);
+  command->footer("Example: rotslam rotations footage.mp4 --camera phone.yaml --out runs/footage");
+  command->callback(
+      [flags, &action] { action = [flags] { return FindAndWriteRotations(*flags); }; });
+}
+
+}  // namespace rotslam

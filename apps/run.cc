@@ -1,0 +1,78 @@
+#include <chrono>
+#include <memory>
+
+#include "apps/command.h"
+#include "apps/config.h"
+#include "apps/orientations.h"
+#include "apps/pipeline.h"
+#include "apps/positions.h"
+#include "apps/progress.h"
+#include "apps/run_directory.h"
+#include "output/ply.h"
+#include "output/trajectory.h"
+
+namespace rotslam {
+namespace {
+
+using Clock = std::chrono::steady_clock;
+
+struct RunFlags {
+  CommonFlags common;
+  InputFlags input;
+};
+
+double SecondsSince(Clock::time_point start) {
+  return std::chrono::duration<double>(Clock::now() - start).count();
+}
+
+int Run(const RunFlags& flags) {
+  const Clock::time_point start = Clock::now();
+  Progress progress(flags.common.quiet);
+  PipelineOptions options;
+  if (!flags.common.config.empty()) LoadOptionsYaml(flags.common.config, options);
+  flags.input.Override(options.sequence);
+
+  Input input = OpenInput(
+      flags.input, options.sequence, [&](const std::string& line) { progress.Say(line); });
+  const std::filesystem::path directory = PrepareRunDirectory(flags.input.out);
+  const Orientations orientations =
+      FindOrientations(input, options.rotodom, flags.common, progress);
+  WriteOrientations(directory, orientations);
+  const double orientations_s = SecondsSince(start);
+
+  const PositionResult positions =
+      FindPositions(orientations, input.camera, options, flags.common.NumThreads(), progress);
+  const double positions_s = SecondsSince(start) - orientations_s;
+  WritePositions(directory, orientations, positions, input.camera, options.cloud_min_angle_deg);
+
+  RunSummary summary = StartSummary("run", input, orientations, DescribeOptions(options));
+  AddPositions(positions, input.camera, summary);
+  summary.seconds = {
+      {"orientations", orientations_s}, {"positions", positions_s}, {"total", SecondsSince(start)}};
+  WriteSummary(directory / "summary.json", summary);
+
+  for (std::size_t k = 1; k < positions.components.size(); ++k) {
+    progress.Warn("no tracks tie the scale of the map from frame " +
+                  std::to_string(positions.components[k].keyframes.begin()->value) +
+                  " on to the part before; it is set so that the speed is continuous");
+  }
+  if (!positions.message.empty()) progress.Warn("no map: " + positions.message);
+  progress.Say("wrote " + directory.string() +
+               ": trajectory_tum.txt, trajectory_kitti.txt, keyframes_tum.txt, "
+               "rotations_tum.txt, cloud.ply, segments.csv, view_graph.g2o, summary.json");
+  return 0;
+}
+
+}  // namespace
+
+void AddRunCommand(CLI::App& app, Action& action) {
+  const auto flags = std::make_shared<RunFlags>();
+  CLI::App* command = app.add_subcommand(
+      "run", "The whole chain: a sequence goes in, a trajectory and a point cloud come out");
+  AddInputFlags(*command, flags->input);
+  AddCommonFlags(*command, flags->common);
+  command->footer("Example: rotslam run kitti/sequences/00 --out runs/kitti00");
+  command->callback([flags, &action] { action = [flags] { return Run(*flags); }; });
+}
+
+}  // namespace rotslam

@@ -1,0 +1,185 @@
+#include "apps/run_directory.h"
+
+#include <algorithm>
+#include <iterator>
+#include <map>
+#include <set>
+#include <stdexcept>
+#include <system_error>
+
+#include "output/atomic_file.h"
+#include "output/g2o.h"
+#include "output/ply.h"
+#include "output/segments.h"
+#include "output/trajectory.h"
+
+namespace rotslam {
+namespace {
+
+// The component that a frame's position belongs to: that of the keyframe at or before it.
+int ComponentAt(const std::vector<MapComponent>& components, int frame) {
+  int found = components.empty() ? -1 : 0;
+  for (int k = 0; k < static_cast<int>(components.size()); ++k) {
+    if (components[k].keyframes.begin()->value <= frame) found = k;
+  }
+  return found;
+}
+
+// Held stretches are `rotating`; what lies between them, cut where a component of the map begins,
+// `translating`.
+std::vector<Segment> Segments(const PositionResult& positions) {
+  const int num_frames = static_cast<int>(positions.cam_from_world.size());
+  std::set<int> starts = {0};
+  std::map<int, const HeldStretch*> held_from;
+  for (const HeldStretch& stretch : positions.held) {
+    starts.insert({stretch.first.value, stretch.last.value + 1});
+    held_from[stretch.first.value] = &stretch;
+  }
+  for (const MapComponent& component : positions.components) {
+    const int first = component.keyframes.begin()->value;
+    const bool inside =
+        std::any_of(positions.held.begin(), positions.held.end(), [&](const HeldStretch& stretch) {
+          return stretch.first.value <= first && first <= stretch.last.value;
+        });
+    if (!inside) starts.insert(first);
+  }
+  starts.erase(starts.lower_bound(num_frames), starts.end());
+
+  std::vector<Segment> segments;
+  for (auto start = starts.begin(); start != starts.end(); ++start) {
+    Segment segment;
+    segment.first_frame = *start;
+    segment.last_frame = (std::next(start) == starts.end() ? num_frames : *std::next(start)) - 1;
+    const auto held = held_from.find(*start);
+    segment.kind = held == held_from.end() ? "translating" : "rotating";
+    segment.evidence = held == held_from.end() ? 0.0 : held->second->evidence;
+    segment.component = ComponentAt(positions.components, *start);
+    segment.scale = segment.component < 0                                       ? "none"
+                    : positions.components[segment.component].placed_by_default ? "continuity"
+                                                                                : "reference";
+    segments.push_back(segment);
+  }
+  return segments;
+}
+
+}  // namespace
+
+std::filesystem::path PrepareRunDirectory(const std::string& out) {
+  const std::filesystem::path directory = out;
+  std::error_code error;
+  std::filesystem::create_directories(directory, error);
+  if (error || !std::filesystem::is_directory(directory)) {
+    throw std::runtime_error(out + ": cannot make this folder for the results: " +
+                             (error ? error.message() : "a file of that name is in the way"));
+  }
+  const std::filesystem::path probe = directory / ".write_test";
+  ReplaceFile(probe, "");
+  std::filesystem::remove(probe, error);
+  return directory;
+}
+
+void WriteOrientations(const std::filesystem::path& directory, const Orientations& orientations) {
+  WriteTumTrajectory(directory / "rotations_tum.txt", RotationTrajectory(orientations));
+  WriteG2o(directory / "view_graph.g2o", {orientations.graph, orientations.cam_from_world, {}});
+}
+
+void WritePositions(const std::filesystem::path& directory,
+                    const Orientations& orientations,
+                    const PositionResult& positions,
+                    const Camera& camera,
+                    double cloud_min_angle_deg) {
+  const Trajectory trajectory = MakeTrajectory(
+      orientations.timestamps_s, positions.cam_from_world, positions.center_in_world);
+  WriteTumTrajectory(directory / "trajectory_tum.txt", trajectory);
+  WriteKittiTrajectory(directory / "trajectory_kitti.txt", trajectory);
+  CenterMap keyframe_centers = positions.center_in_world;
+  std::erase_if(keyframe_centers,
+                [&](const auto& entry) { return !positions.keyframes.contains(entry.first); });
+  WriteTumTrajectory(
+      directory / "keyframes_tum.txt",
+      MakeTrajectory(orientations.timestamps_s, positions.cam_from_world, keyframe_centers));
+  WritePly(directory / "cloud.ply",
+           MakeCloud(WithoutShallowPoints(positions.map, cloud_min_angle_deg), camera));
+  WriteSegments(directory / "segments.csv", Segments(positions));
+}
+
+RunSummary StartSummary(const std::string& command,
+                        const Input& input,
+                        const Orientations& orientations,
+                        std::vector<OptionEntry> options) {
+  RunSummary summary;
+  summary.command = command;
+  summary.options = std::move(options);
+  summary.camera = input.camera;
+  const auto count = [](std::size_t value) { return static_cast<std::int64_t>(value); };
+  summary.sequence = {{"description", input.sequence->Describe()},
+                      {"camera_file", input.camera_file},
+                      {"first_timestamp_s", orientations.timestamps_s.front()},
+                      {"last_timestamp_s", orientations.timestamps_s.back()}};
+  summary.counts = {{"frames", count(orientations.timestamps_s.size())},
+                    {"unreadable_frames", std::int64_t{orientations.num_unreadable}},
+                    {"frames_without_edge", std::int64_t{orientations.num_predicted}},
+                    {"frames_with_weak_edge", std::int64_t{orientations.num_weak}},
+                    {"edges", count(orientations.graph.edges().size())}};
+  double inliers = 0.0;
+  std::int64_t rotation_only = 0;
+  for (const RelativeRotation& edge : orientations.graph.edges()) {
+    inliers += edge.num_inliers;
+    rotation_only += edge.rotation_only;
+  }
+  summary.rotodom = SummaryTable{
+      {"mean_inliers_per_edge", inliers / static_cast<double>(orientations.graph.edges().size())},
+      {"rotation_only_edges", rotation_only}};
+  return summary;
+}
+
+void AddPositions(const PositionResult& positions, const Camera& camera, RunSummary& summary) {
+  const auto count = [](std::size_t value) { return static_cast<std::int64_t>(value); };
+  summary.counts.push_back({"keyframes", count(positions.keyframes.size())});
+  summary.counts.push_back({"points", count(positions.map.point_in_world.size())});
+  summary.counts.push_back({"components", count(positions.components.size())});
+  summary.counts.push_back({"resected_frames", std::int64_t{positions.num_resected}});
+  summary.counts.push_back({"interpolated_frames", std::int64_t{positions.num_interpolated}});
+  summary.segments = Segments(positions);
+
+  SummaryKrot krot;
+  krot.status = ToString(positions.krot.status);
+  krot.gamma_low = positions.krot.gamma_low;
+  krot.gamma_high = positions.krot.gamma_high;
+  krot.gamma_low_px = positions.krot.gamma_low * camera.MeanFocal();
+  krot.gamma_high_px = positions.krot.gamma_high * camera.MeanFocal();
+  krot.removed = count(positions.krot.removed.size());
+  krot.more = {{"message", positions.krot.message}};
+  summary.krot = krot;
+  if (positions.bundles.empty()) return;
+
+  // Sums over the components; means are weighted by their observations.
+  std::int64_t observations = 0;
+  std::int64_t iterations = 0;
+  double initial_cost = 0.0;
+  double final_cost = 0.0;
+  double error_sum_px = 0.0;
+  for (const BundleSummary& bundle : positions.bundles) {
+    observations += bundle.num_observations;
+    iterations += bundle.iterations;
+    initial_cost += bundle.initial_cost;
+    final_cost += bundle.final_cost;
+    error_sum_px += bundle.after.mean_px * bundle.num_observations;
+  }
+  const ResidualStatistics& largest =
+      std::max_element(positions.bundles.begin(),
+                       positions.bundles.end(),
+                       [](const BundleSummary& a, const BundleSummary& b) {
+                         return a.num_observations < b.num_observations;
+                       })
+          ->after;
+  summary.ba = SummaryTable{{"observations", observations},
+                            {"iterations", iterations},
+                            {"initial_cost", initial_cost},
+                            {"final_cost", final_cost},
+                            {"mean_error_px", error_sum_px / static_cast<double>(observations)},
+                            {"median_error_px", largest.median_px},
+                            {"p90_error_px", largest.p90_px}};
+}
+
+}  // namespace rotslam

@@ -1,0 +1,35 @@
+#pragma once
+
+#include <filesystem>
+
+#include "apps/orientations.h"
+#include "apps/positions.h"
+#include "output/summary.h"
+
+namespace rotslam {
+
+/// Makes the folder for a run's results and proves that it can be written, before hours of work.
+/// Throws std::runtime_error with path and reason.
+std::filesystem::path PrepareRunDirectory(const std::string& out);
+
+/// rotations_tum.txt and view_graph.g2o.
+void WriteOrientations(const std::filesystem::path& directory, const Orientations& orientations);
+
+/// trajectory_tum.txt, trajectory_kitti.txt, keyframes_tum.txt, cloud.ply and segments.csv. Points
+/// whose rays meet at less than `cloud_min_angle_deg` stay out of the cloud.
+void WritePositions(const std::filesystem::path& directory,
+                    const Orientations& orientations,
+                    const PositionResult& positions,
+                    const Camera& camera,
+                    double cloud_min_angle_deg);
+
+/// The parts of summary.json that `run` and `rotations` share.
+RunSummary StartSummary(const std::string& command,
+                        const Input& input,
+                        const Orientations& orientations,
+                        std::vector<OptionEntry> options);
+
+/// The parts that only `run` has.
+void AddPositions(const PositionResult& positions, const Camera& camera, RunSummary& summary);
+
+}  // namespace rotslam

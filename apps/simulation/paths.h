@@ -1,0 +1,74 @@
+#pragma once
+
+#include <functional>
+#include <string>
+#include <vector>
+
+#include "rotodom/types/trajectory.h"
+
+namespace rotslam {
+
+enum class MotionKind { kTranslating, kRotating };
+
+/// `translating` or `rotating`, as segments.csv spells it.
+const char* Name(MotionKind kind);
+
+/// Frames first_frame .. last_frame, both included.
+struct Stretch {
+  int first_frame = 0;
+  int last_frame = 0;
+  MotionKind kind = MotionKind::kTranslating;
+};
+
+/// A camera's pose as an exact function of time, and how it is filmed.
+struct CameraPath {
+  /// Pose at a time since the start; any time, also a little before 0 and after the end.
+  std::function<StampedPose(double time_s)> at;
+  double fps = 30.0;
+  int num_frames = 0;              // frame k is taken at time k / fps
+  std::vector<Stretch> stretches;  // empty: the path is not made of stretches
+};
+
+struct HandheldPathOptions {
+  int num_frames = 150;
+  double fps = 30.0;
+  double speed_scale = 1.0;  // 1: about 0.4 m/s and 25 deg/s
+  std::uint64_t seed = 1;    // turns the phases of the sway
+};
+
+/// A walk with the camera in the hand, in the free middle of MakeRoom: position and orientation are
+/// sums of sinusoids, smooth to any order.
+CameraPath HandheldPath(const HandheldPathOptions& options);
+
+struct GimbalPathOptions {
+  int num_frames = 120;
+  double fps = 30.0;
+  double turn_deg = 120.0;   // between the views of the two translating stretches
+  double lever_arm_m = 0.0;  // from the axis of the turn forward to the camera's centre
+};
+
+/// Translate, stop, rotate in place, translate on, in the middle of MakeRoom: 30 %, 40 % and 30 %
+/// of the frames. Twice continuously differentiable. Without a lever arm the centre is the very
+/// same three numbers throughout the rotating stretch.
+CameraPath GimbalPath(const GimbalPathOptions& options);
+
+struct StreetPathOptions {
+  double fps = 10.0;
+  double speed_scale = 1.0;  // 1: 7 m/s
+};
+
+/// Fifty metres of street, a right turn of 90 deg on an arc that bends gently in and out, forty
+/// metres more; the camera starts at the origin and looks forward, with a slight sway.
+CameraPath StreetPath(const StreetPathOptions& options);
+
+/// A path through given poses, pose k being reached at time k / fps (speed_scale 1): exactly there,
+/// and between them by cubic (Catmull-Rom) centres and spherical linear orientations.
+/// @param poses  at least two; their timestamps are not used.
+CameraPath PathThroughPoses(Trajectory poses, double fps, double speed_scale);
+
+/// Reads a KITTI pose file: twelve numbers a line, the rows of [R | t], camera->world. The
+/// rotations are made orthonormal; timestamps are zero. Throws std::runtime_error that names file
+/// and line.
+Trajectory ReadKittiPoses(const std::string& path);
+
+}  // namespace rotslam

@@ -1,0 +1,82 @@
+#pragma once
+
+#include <cstdint>
+#include <functional>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include <opencv2/core/mat.hpp>
+
+#include "apps/simulation/world.h"
+#include "rotodom/camera/camera.h"
+#include "rotodom/types/trajectory.h"
+
+namespace rotslam {
+
+/// How light becomes grey levels. With noise, exposure change and blur off, the picture of a
+/// surface point depends on the point and the pixel's footprint alone.
+struct RenderOptions {
+  double noise_grey = 2.0;           // standard deviation of the sensor noise, in grey levels
+  double exposure_variation = 0.05;  // gain wanders within 1 +- this, over a few seconds
+  int blur_subframes = 1;    // pictures averaged over the time the shutter is open; 1: sharp
+  double shutter_s = 0.012;  // that time; centred on the frame's timestamp
+  bool color = false;        // BGR instead of grey
+  int edge_samples = 3;      // per axis, in pixels that show more than one surface
+  std::uint64_t seed = 1;
+
+  std::optional<std::string> Problem() const;
+
+  template <class Visitor>
+  void Visit(Visitor&& visit) {
+    visit("noise_grey", noise_grey);
+    visit("exposure_variation", exposure_variation);
+    visit("blur_subframes", blur_subframes);
+    visit("shutter_s", shutter_s);
+    visit("color", color);
+    visit("edge_samples", edge_samples);
+    visit("seed", seed);
+  }
+};
+
+/// Bearings of a camera's pixel centres and pixel corners, computed once for all its pictures.
+class PixelRays {
+ public:
+  /// Throws std::invalid_argument where camera.Problem() or the camera has no size.
+  explicit PixelRays(const Camera& camera);
+
+  int Width() const { return width_; }
+  int Height() const { return height_; }
+  /// Zero where the camera sees nothing (beyond the fold of its distortion).
+  const Eigen::Vector3d& Center(int x, int y) const { return centers_[index(x, y, width_)]; }
+  /// Top left corner of pixel (x, y); x up to Width(), y up to Height().
+  const Eigen::Vector3d& Corner(int x, int y) const { return corners_[index(x, y, width_ + 1)]; }
+
+ private:
+  static std::size_t index(int x, int y, int width) {
+    return static_cast<std::size_t>(y) * static_cast<std::size_t>(width) +
+           static_cast<std::size_t>(x);
+  }
+
+  int width_ = 0;
+  int height_ = 0;
+  std::vector<Eigen::Vector3d> centers_;
+  std::vector<Eigen::Vector3d> corners_;
+};
+
+/// Renders what the camera sees at a time.
+/// @param pose_at   pose as a function of time; asked at `time_s` and, with blur, around it.
+/// @param frame     number of the picture; keys its noise together with options.seed.
+/// @return  CV_8UC1, or CV_8UC3 with options.color. A pure function of its arguments.
+/// Cost:    two to three tenths of a microsecond a pixel and sub-frame, one ray and about one
+/// texture
+///          sample; more where surfaces meet.
+cv::Mat RenderFrame(const World& world,
+                    const std::vector<MovingBox>& moving,
+                    const PixelRays& rays,
+                    const std::function<StampedPose(double)>& pose_at,
+                    double time_s,
+                    int frame,
+                    const RenderOptions& options);
+
+}  // namespace rotslam

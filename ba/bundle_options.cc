@@ -1,0 +1,52 @@
+#include "ba/bundle_options.h"
+
+#include <sstream>
+
+namespace rotslam {
+namespace {
+
+// "name is value, must be limit"; written so that NaN counts as out of range.
+template <class T>
+std::string OutOfRange(const std::string& name, const T& value, const std::string& limit) {
+  std::ostringstream text;
+  text << name << " is " << value << ", must be " << limit;
+  return text.str();
+}
+
+}  // namespace
+
+std::optional<std::string> BundleRound::Problem() const {
+  if (!(max_error_px >= 0.0)) return OutOfRange("max_error_px", max_error_px, "at least 0");
+  if (loss != "huber" && loss != "cauchy" && loss != "none") {
+    return OutOfRange("loss", loss, "huber, cauchy or none");
+  }
+  if (!(loss_scale > 0.0)) return OutOfRange("loss_scale", loss_scale, "positive");
+  if (max_iterations < 1) return OutOfRange("max_iterations", max_iterations, "at least 1");
+  if (!(function_tolerance >= 0.0)) {
+    return OutOfRange("function_tolerance", function_tolerance, "at least 0");
+  }
+  return std::nullopt;
+}
+
+std::optional<std::string> BundleOptions::Problem() const {
+  if (const auto problem = bridge.Problem()) return "bridge." + *problem;
+  if (const auto problem = coarse.Problem()) return "coarse." + *problem;
+  if (const auto problem = fine.Problem()) return "fine." + *problem;
+  if (!bridge.enabled && !coarse.enabled && !fine.enabled) {
+    return "fine.enabled is false, must be true for one of bridge, coarse and fine";
+  }
+  if (min_observations < 2) {
+    return OutOfRange("min_observations", min_observations, "at least 2");
+  }
+  if (!(min_angle_deg > 0.0 && min_angle_deg < 90.0)) {
+    return OutOfRange("min_angle_deg", min_angle_deg, "above 0 and below 90");
+  }
+  if (min_frame_observations < 3) {
+    return OutOfRange("min_frame_observations", min_frame_observations, "at least 3");
+  }
+  if (max_dense_frames < 0) return OutOfRange("max_dense_frames", max_dense_frames, "at least 0");
+  if (num_threads < 1) return OutOfRange("num_threads", num_threads, "at least 1");
+  return std::nullopt;
+}
+
+}  // namespace rotslam

@@ -1,0 +1,89 @@
+#pragma once
+
+#include <optional>
+#include <string>
+
+namespace rotslam {
+
+/// One round of classification and minimisation.
+struct BundleRound {
+  // Skip the round altogether.
+  bool enabled = true;
+  // Whether rotations move. Held, they carry positions and points that are metres off to a place
+  // from where everything may move.
+  bool refine_rotations = true;
+  // Observations farther than this from their point, as the cameras stand before the round, are
+  // left out of it. For keypoints with sigma_px above 1 it grows with sigma_px. Zero: nothing is.
+  double max_error_px = 0.0;
+  // "huber", "cauchy" or "none".
+  std::string loss = "huber";
+  // Residual, in sigmas, at which the loss leaves the quadratic.
+  double loss_scale = 1.0;
+  // Levenberg-Marquardt steps.
+  int max_iterations = 30;
+  // Stop when a step changes the cost by less than this share. Rounds that only prepare the next
+  // one do not need their last digits.
+  double function_tolerance = 1e-4;
+
+  std::optional<std::string> Problem() const;
+
+  template <class Visitor>
+  void Visit(Visitor&& visit) {
+    visit("enabled", enabled);
+    visit("refine_rotations", refine_rotations);
+    visit("max_error_px", max_error_px);
+    visit("loss", loss);
+    visit("loss_scale", loss_scale);
+    visit("max_iterations", max_iterations);
+    visit("function_tolerance", function_tolerance);
+  }
+};
+
+struct BundleOptions {
+  // From known-rotation positions, which are a few percent of the path length off, so that a tight
+  // test against them would throw away 5 to 10 % of the good observations: none is made. Outliers
+  // still in it keep the cost moving long after the cameras have arrived, hence the tolerance.
+  BundleRound bridge = {.refine_rotations = false, .max_error_px = 0.0, .function_tolerance = 1e-3};
+  // What is within 4 px of the bridge, rotations free.
+  BundleRound coarse = {.max_error_px = 4.0};
+  // What is within 2 px of that. Its `max_error_px` also decides what the result keeps.
+  BundleRound fine = {.max_error_px = 2.0, .max_iterations = 50, .function_tolerance = 1e-6};
+  // false holds the rotations in every round: they come out bit by bit as they went in.
+  bool refine_rotations = true;
+
+  // A track with fewer fitting observations is dropped. Two views always agree along the epipolar
+  // line, so two say nothing about the match; three do.
+  int min_observations = 3;
+  // A point needs two rays that meet at this angle, else its depth is noise. Low on purpose: a
+  // shallow point holds rotations well: 1 deg instead of 0.2 costs KITTI 00 (first 200 frames) 4 %
+  // of its position error, 0.05 deg gains nothing. At a focal length of 700 px, 0.2 deg is 2.4 px
+  // of parallax. For clouds to look at see WithoutShallowPoints.
+  double min_angle_deg = 0.2;
+  // A frame with fewer fitting observations is left out of a round: six unknowns on a handful of
+  // points follow any outlier.
+  int min_frame_observations = 12;
+
+  // Up to this many camera blocks the reduced system is factored densely (DENSE_SCHUR), above by
+  // CHOLMOD (SPARSE_SCHUR).
+  int max_dense_frames = 40;
+  // For triangulation and classification. The solver itself runs on one thread: Ceres adds up in
+  // the order in which threads finish, which changes last digits from run to run.
+  int num_threads = 1;
+
+  // The first field out of range, by name, value and limit; nullopt when all is well.
+  std::optional<std::string> Problem() const;
+
+  template <class Visitor>
+  void Visit(Visitor&& visit) {
+    visit("bridge", bridge);
+    visit("coarse", coarse);
+    visit("fine", fine);
+    visit("refine_rotations", refine_rotations);
+    visit("min_observations", min_observations);
+    visit("min_angle_deg", min_angle_deg);
+    visit("min_frame_observations", min_frame_observations);
+    visit("max_dense_frames", max_dense_frames);
+  }
+};
+
+}  // namespace rotslam

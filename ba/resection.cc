@@ -1,0 +1,253 @@
+#include "ba/resection.h"
+
+#include <algorithm>
+#include <cmath>
+#include <sstream>
+#include <stdexcept>
+
+#include <Eigen/Dense>
+
+#include "ba/reprojection_cost.h"
+
+namespace rotslam {
+namespace {
+
+using Vector6d = Eigen::Matrix<double, 6, 1>;
+using Matrix6d = Eigen::Matrix<double, 6, 6>;
+
+// A step that gains less, in squared sigmas, moves the pose by 1e-4 of its standard deviation.
+constexpr double kWorthlessGain = 1e-9;
+
+// Steps at each of the wider scales, which only lead to the last one.
+constexpr int kCoarseIterations = 3;
+
+struct Pose {
+  Rotation cam_from_world;
+  Eigen::Vector3d center_in_world;
+};
+
+// (I - ...) with Log(Exp(delta) Exp(phi)) = phi + LeftInverse(phi) delta, to first order.
+Eigen::Matrix3d LeftInverse(const Eigen::Vector3d& phi) {
+  const double angle = phi.norm();
+  const Eigen::Matrix3d S = Skew(phi);
+  const double c =
+      angle < 1e-3 ? 1.0 / 12.0 : 1.0 / (angle * angle) - 0.5 / (angle * std::tan(0.5 * angle));
+  return Eigen::Matrix3d::Identity() - 0.5 * S + c * S * S;
+}
+
+// Normal equations of one pass: information, its right-hand side, and the robust cost.
+struct Normal {
+  Matrix6d H = Matrix6d::Zero();
+  Vector6d g = Vector6d::Zero();
+  double cost = 0.0;
+};
+
+class Resection {
+ public:
+  Resection(const Camera& camera,
+            const std::vector<PointSighting>& sightings,
+            const ResectionStart& start,
+            const ResectionOptions& options)
+      : camera_(camera), sightings_(sightings), start_(start), options_(options) {
+    if (start.rotation_covariance) prior_information_ = start.rotation_covariance->inverse();
+  }
+
+  // Residual in sigmas; what does not project is far off.
+  double Sigmas(const Pose& pose, const PointSighting& sighting) const {
+    const auto pixel = Reproject(
+        camera_, pose.cam_from_world.Matrix(), pose.center_in_world, sighting.point_in_world);
+    const double error_px = pixel ? (*pixel - sighting.keypoint_px).norm() : kUnseenResidual_px;
+    return error_px / sighting.sigma_px;
+  }
+
+  double MedianSigmas(const Pose& pose) const {
+    std::vector<double> sigmas;
+    for (const PointSighting& sighting : sightings_) sigmas.push_back(Sigmas(pose, sighting));
+    std::nth_element(sigmas.begin(), sigmas.begin() + sigmas.size() / 2, sigmas.end());
+    return sigmas[sigmas.size() / 2];
+  }
+
+  bool IsInlier(const Pose& pose, const PointSighting& sighting) const {
+    return Sigmas(pose, sighting) * sighting.sigma_px <=
+           options_.max_error_px * std::max(1.0, sighting.sigma_px);
+  }
+
+  // `scale`: of Geman-McClure's loss s^2 / 2 r^2 / (r^2 + s^2); zero: inliers, plainly weighted.
+  Normal Evaluate(const Pose& pose, double scale) const {
+    Normal normal;
+    const Eigen::Matrix3d R_c_w = pose.cam_from_world.Matrix();
+    for (const PointSighting& sighting : sightings_) {
+      if (scale == 0.0 && !IsInlier(pose, sighting)) continue;
+      ReprojectionJacobian J;
+      const auto pixel =
+          Reproject(camera_, R_c_w, pose.center_in_world, sighting.point_in_world, &J);
+      const Eigen::Vector2d residual =
+          pixel ? Eigen::Vector2d((*pixel - sighting.keypoint_px) / sighting.sigma_px)
+                : Eigen::Vector2d::Constant(kUnseenResidual_px / sighting.sigma_px);
+      const double squared = residual.squaredNorm();
+      const double keep = scale == 0.0 ? 1.0 : scale * scale / (squared + scale * scale);
+      normal.cost += 0.5 * squared * keep;
+      if (!pixel) continue;
+      Eigen::Matrix<double, 2, 6> J_pose;
+      J_pose << J.by_rotation, J.by_center;
+      J_pose /= sighting.sigma_px;
+      const double weight = keep * keep;
+      normal.H.noalias() += weight * J_pose.transpose() * J_pose;
+      normal.g.noalias() += weight * J_pose.transpose() * residual;
+    }
+    AddPrior(pose, normal);
+    Hold(normal);
+    return normal;
+  }
+
+  // Levenberg-Marquardt at one scale. Returns whether it settled.
+  bool Minimise(double scale, int max_iterations, Pose& pose) const {
+    double damping = 1e-6;
+    Normal normal = Evaluate(pose, scale);
+    for (int iteration = 0; iteration < max_iterations; ++iteration) {
+      Matrix6d H = normal.H;
+      H.diagonal() *= 1.0 + damping;
+      const Vector6d step = -H.ldlt().solve(normal.g);
+      if (!step.allFinite()) return false;
+      // Cost this step may gain, in squared sigmas.
+      const double expected = -0.5 * normal.g.dot(step);
+      const Pose next = Moved(pose, step);
+      // Most steps are taken, so the derivatives at the next pose are rarely in vain.
+      const Normal next_normal = Evaluate(next, scale);
+      if (next_normal.cost <= normal.cost) {
+        pose = next;
+        normal = next_normal;
+        damping = std::max(1e-12, 0.1 * damping);
+      } else {
+        damping *= 10.0;
+      }
+      if (expected <= kWorthlessGain) return true;
+    }
+    return false;
+  }
+
+ private:
+  // What is held keeps its last bit.
+  Pose Moved(const Pose& pose, const Vector6d& step) const {
+    Pose moved = pose;
+    if (options_.refine_rotation) {
+      moved.cam_from_world = Rotation::Exp(step.head<3>()) * pose.cam_from_world;
+    }
+    if (options_.refine_center) moved.center_in_world += step.tail<3>();
+    return moved;
+  }
+
+  void AddPrior(const Pose& pose, Normal& normal) const {
+    if (!prior_information_) return;
+    const Eigen::Vector3d phi = (pose.cam_from_world * start_.cam_from_world.Inverse()).Log();
+    const Eigen::Matrix3d J = LeftInverse(phi);
+    normal.cost += 0.5 * phi.dot(*prior_information_ * phi);
+    normal.H.topLeftCorner<3, 3>() += J.transpose() * *prior_information_ * J;
+    normal.g.head<3>() += J.transpose() * *prior_information_ * phi;
+  }
+
+  // Decouples what does not move: zero gradient, identity information.
+  void Hold(Normal& normal) const {
+    const auto hold = [&](int first) {
+      normal.H.middleRows<3>(first).setZero();
+      normal.H.middleCols<3>(first).setZero();
+      normal.H.block<3, 3>(first, first).setIdentity();
+      normal.g.segment<3>(first).setZero();
+    };
+    if (!options_.refine_rotation) hold(0);
+    if (!options_.refine_center) hold(3);
+  }
+
+  const Camera& camera_;
+  const std::vector<PointSighting>& sightings_;
+  const ResectionStart& start_;
+  const ResectionOptions& options_;
+  std::optional<Eigen::Matrix3d> prior_information_;
+};
+
+// Inverse of the information; nullopt when it leaves a direction open. Scaled to a unit diagonal
+// first, since radians and world units do not compare.
+std::optional<Matrix6d> Covariance(const Matrix6d& H) {
+  if (!H.allFinite() || !(H.diagonal().minCoeff() > 0.0)) return std::nullopt;
+  const Vector6d scale = H.diagonal().cwiseSqrt().cwiseInverse();
+  const Eigen::SelfAdjointEigenSolver<Matrix6d> eigen(scale.asDiagonal() * H * scale.asDiagonal());
+  if (eigen.info() != Eigen::Success || eigen.eigenvalues()[0] < 1e-12) return std::nullopt;
+  const Matrix6d inverse = eigen.eigenvectors() * eigen.eigenvalues().cwiseInverse().asDiagonal() *
+                           eigen.eigenvectors().transpose();
+  return Matrix6d(scale.asDiagonal() * inverse * scale.asDiagonal());
+}
+
+}  // namespace
+
+std::optional<std::string> ResectionOptions::Problem() const {
+  std::ostringstream text;
+  if (!refine_rotation && !refine_center) {
+    text << "refine_center is false, must be true where refine_rotation is false";
+  } else if (!(loss_scale > 0.0)) {
+    text << "loss_scale is " << loss_scale << ", must be positive";
+  } else if (!(max_error_px > 0.0)) {
+    text << "max_error_px is " << max_error_px << ", must be positive";
+  } else if (min_inliers < 3) {
+    text << "min_inliers is " << min_inliers << ", must be at least 3";
+  } else if (max_iterations < 1) {
+    text << "max_iterations is " << max_iterations << ", must be at least 1";
+  } else {
+    return std::nullopt;
+  }
+  return text.str();
+}
+
+std::optional<ResectedPose> ResectFrame(const Camera& camera,
+                                        const std::vector<PointSighting>& sightings,
+                                        const ResectionStart& start,
+                                        const ResectionOptions& options) {
+  const auto refuse = [](const std::string& reason) {
+    throw std::invalid_argument("ResectFrame: " + reason);
+  };
+  if (const auto problem = options.Problem()) refuse("option " + *problem);
+  if (const auto problem = camera.Problem()) refuse("camera " + *problem);
+  if (!start.center_in_world.allFinite()) refuse("the start centre is not finite");
+  if (start.rotation_covariance && !(start.rotation_covariance->allFinite() &&
+                                     start.rotation_covariance->llt().info() == Eigen::Success)) {
+    refuse("the rotation covariance is not positive definite");
+  }
+
+  std::vector<PointSighting> finite;
+  for (const PointSighting& sighting : sightings) {
+    if (sighting.point_in_world.allFinite() && sighting.keypoint_px.allFinite() &&
+        std::isfinite(sighting.sigma_px) && sighting.sigma_px > 0.0) {
+      finite.push_back(sighting);
+    }
+  }
+  if (static_cast<int>(finite.size()) < options.min_inliers) return std::nullopt;
+
+  const Resection resection(camera, finite, start, options);
+  Pose pose = {start.cam_from_world, start.center_in_world};
+  // Wide at first, so that a start that is off still feels the inliers.
+  double scale = std::max(options.loss_scale, 2.0 * resection.MedianSigmas(pose));
+  for (; scale > options.loss_scale; scale = std::max(options.loss_scale, 0.5 * scale)) {
+    resection.Minimise(scale, kCoarseIterations, pose);
+  }
+  if (!resection.Minimise(options.loss_scale, options.max_iterations, pose)) return std::nullopt;
+
+  ResectedPose result;
+  result.cam_from_world = pose.cam_from_world;
+  result.center_in_world = pose.center_in_world;
+  double squares = 0.0;
+  for (const PointSighting& sighting : finite) {
+    if (!resection.IsInlier(pose, sighting)) continue;
+    ++result.num_inliers;
+    const double error_px = resection.Sigmas(pose, sighting) * sighting.sigma_px;
+    squares += error_px * error_px;
+  }
+  if (result.num_inliers < options.min_inliers) return std::nullopt;
+  result.rms_px = std::sqrt(squares / result.num_inliers);
+  const std::optional<Matrix6d> covariance = Covariance(resection.Evaluate(pose, 0.0).H);
+  if (!covariance) return std::nullopt;
+  result.covariance = *covariance;
+  if (!options.refine_rotation) result.covariance.topLeftCorner<3, 3>().setZero();
+  if (!options.refine_center) result.covariance.bottomRightCorner<3, 3>().setZero();
+  return result;
+}
+
+}  // namespace rotslam

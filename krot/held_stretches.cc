@@ -1,0 +1,69 @@
+#include "krot/held_stretches.h"
+
+#include <stdexcept>
+
+namespace rotslam {
+namespace {
+
+// Of the edges across the step from frame n-1 to frame n: the span of the longest, and how many of
+// that span there are and show no baseline.
+struct Evidence {
+  int span = 0;
+  int edges = 0;
+  int rotation_only = 0;
+
+  void Add(int edge_span, bool edge_rotation_only) {
+    if (edge_span < span) return;
+    if (edge_span > span) *this = {edge_span, 0, 0};
+    ++edges;
+    rotation_only += edge_rotation_only;
+  }
+  double Ratio() const { return edges == 0 ? 0.0 : static_cast<double>(rotation_only) / edges; }
+};
+
+}  // namespace
+
+std::optional<std::string> HeldStretchOptions::Problem() const {
+  if (!(min_rotation_only_ratio > 0.0 && min_rotation_only_ratio <= 1.0)) {
+    return "min_rotation_only_ratio = " + std::to_string(min_rotation_only_ratio) +
+           ": must be above 0 and at most 1";
+  }
+  if (min_frames < 2) return "min_frames = " + std::to_string(min_frames) + ": must be at least 2";
+  return std::nullopt;
+}
+
+std::vector<HeldStretch> FindHeldStretches(const ViewGraph& graph,
+                                           const RotationMap& cam_from_world,
+                                           const HeldStretchOptions& options) {
+  if (const auto problem = options.Problem())
+    throw std::invalid_argument("HeldStretchOptions: " + *problem);
+  if (!options.enabled || cam_from_world.empty()) return {};
+  std::vector<FrameId> frames;
+  std::map<FrameId, int> position;
+  for (const auto& [frame, rotation] : cam_from_world) {
+    position[frame] = static_cast<int>(frames.size());
+    frames.push_back(frame);
+  }
+  std::vector<Evidence> steps(frames.size());  // steps[n]: from frame n-1 to frame n
+  for (const RelativeRotation& edge : graph.edges()) {
+    const int first = position.at(edge.i);
+    const int last = position.at(edge.j);
+    for (int n = first + 1; n <= last; ++n) steps[n].Add(last - first, edge.rotation_only);
+  }
+  std::vector<HeldStretch> stretches;
+  const int count = static_cast<int>(frames.size());
+  for (int n = 1; n < count; ++n) {
+    if (steps[n].Ratio() < options.min_rotation_only_ratio) continue;
+    const int first = n - 1;
+    double sum = 0.0;
+    while (n < count && steps[n].Ratio() >= options.min_rotation_only_ratio)
+      sum += steps[n++].Ratio();
+    const int last = n - 1;
+    if (last - first + 1 >= options.min_frames) {
+      stretches.push_back({frames[first], frames[last], sum / (last - first)});
+    }
+  }
+  return stretches;
+}
+
+}  // namespace rotslam

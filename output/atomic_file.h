@@ -1,0 +1,20 @@
+#pragma once
+
+#include <filesystem>
+#include <functional>
+#include <string_view>
+
+namespace rotslam {
+
+/// Writes a file so that nobody ever sees half of it: `write` fills `path` + ".tmp" in the same
+/// folder, which is then renamed to `path`. When anything fails the temporary file is removed and
+/// an older `path` stays as it was.
+/// Throws std::runtime_error naming `path` and the reason when the disk or the permissions refuse;
+/// what `write` throws passes through.
+void ReplaceFile(const std::filesystem::path& path,
+                 const std::function<void(const std::filesystem::path& temporary)>& write);
+
+/// The same for content already in memory.
+void ReplaceFile(const std::filesystem::path& path, std::string_view content);
+
+}  // namespace rotslam

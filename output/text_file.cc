@@ -1,0 +1,75 @@
+#include "output/text_file.h"
+
+#include <array>
+#include <cerrno>
+#include <charconv>
+#include <cmath>
+#include <cstdio>
+#include <cstring>
+#include <fstream>
+#include <stdexcept>
+#include <string_view>
+#include <system_error>
+
+namespace rotslam {
+namespace {
+
+std::vector<std::string> SplitWords(std::string_view line) {
+  constexpr std::string_view kSeparators = " \t\r,";
+  std::vector<std::string> words;
+  std::size_t begin = line.find_first_not_of(kSeparators);
+  while (begin != std::string_view::npos) {
+    const std::size_t end = std::min(line.find_first_of(kSeparators, begin), line.size());
+    words.emplace_back(line.substr(begin, end - begin));
+    begin = line.find_first_not_of(kSeparators, end);
+  }
+  return words;
+}
+
+}  // namespace
+
+std::vector<TextRow> ReadTextRows(const std::filesystem::path& path) {
+  std::error_code error;
+  if (std::filesystem::is_directory(path, error)) {
+    throw std::runtime_error(path.string() + ": is a folder, not a file");
+  }
+  std::ifstream file(path);
+  if (!file) throw std::runtime_error(path.string() + ": " + std::strerror(errno));
+  std::vector<TextRow> rows;
+  std::string line;
+  for (int number = 1; std::getline(file, line); ++number) {
+    std::vector<std::string> words = SplitWords(line);
+    if (words.empty() || words.front().front() == '#') continue;
+    rows.push_back({number, std::move(words)});
+  }
+  if (file.bad()) throw std::runtime_error(path.string() + ": reading stopped half way");
+  return rows;
+}
+
+std::string AtLine(const std::filesystem::path& path, int line, const std::string& reason) {
+  return path.string() + ":" + std::to_string(line) + ": " + reason;
+}
+
+double NumberAt(const std::filesystem::path& path, const TextRow& row, std::size_t position) {
+  if (position >= row.words.size()) {
+    throw std::runtime_error(AtLine(path, row.line, "the line ends too early"));
+  }
+  const std::string& word = row.words[position];
+  const char* begin = word.data() + (word.front() == '+' ? 1 : 0);
+  const char* end = word.data() + word.size();
+  double value = 0.0;
+  const auto [stop, code] = std::from_chars(begin, end, value);
+  if (code != std::errc() || stop != end || !std::isfinite(value)) {
+    throw std::runtime_error(
+        AtLine(path, row.line, "expected a finite number, found \"" + word + "\""));
+  }
+  return value;
+}
+
+std::string FormatNumber(const char* format, double value) {
+  std::array<char, 400> buffer;  // the longest double in %f has 309 digits before its point
+  const int length = std::snprintf(buffer.data(), buffer.size(), format, value);
+  return std::string(buffer.data(), static_cast<std::size_t>(length));
+}
+
+}  // namespace rotslam

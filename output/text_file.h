@@ -1,0 +1,29 @@
+#pragma once
+
+#include <filesystem>
+#include <string>
+#include <vector>
+
+namespace rotslam {
+
+/// One line of a text file that carries data, cut at blanks and commas.
+struct TextRow {
+  int line = 0;  // 1 is the file's first line
+  std::vector<std::string> words;
+};
+
+/// The lines of a text file without the empty ones and those that start with '#'.
+/// Throws std::runtime_error naming `path` when it cannot be read.
+std::vector<TextRow> ReadTextRows(const std::filesystem::path& path);
+
+/// "path:line: reason", the form in which readers report what is wrong in a file.
+std::string AtLine(const std::filesystem::path& path, int line, const std::string& reason);
+
+/// The row's word at `position` as a finite number; throws std::runtime_error with file and line
+/// when it is something else.
+double NumberAt(const std::filesystem::path& path, const TextRow& row, std::size_t position);
+
+/// `value` with `format`, one printf conversion for a double ("%.12g").
+std::string FormatNumber(const char* format, double value);
+
+}  // namespace rotslam

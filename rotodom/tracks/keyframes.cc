@@ -1,0 +1,127 @@
+#include "rotodom/tracks/keyframes.h"
+
+#include <algorithm>
+#include <cmath>
+#include <map>
+#include <stdexcept>
+
+namespace rotslam {
+namespace {
+
+struct Ray {
+  int track;
+  Eigen::Vector3d direction;  // in the world's axes
+};
+
+std::map<FrameId, std::vector<Ray>> RaysOfFrames(const RotationMap& cam_from_world,
+                                                 const std::vector<Track>& tracks) {
+  std::map<FrameId, std::vector<Ray>> rays;
+  for (int k = 0; k < static_cast<int>(tracks.size()); ++k) {
+    for (const Observation& observation : tracks[k].observations) {
+      const auto rotation = cam_from_world.find(observation.frame);
+      if (rotation == cam_from_world.end()) continue;
+      rays[observation.frame].push_back({k, rotation->second.Inverse() * observation.bearing});
+    }
+  }
+  return rays;
+}
+
+struct Overlap {
+  double shared_ratio = 0.0;
+  double parallax_rad = 0.0;  // median over the shared tracks
+};
+
+// Both sorted by track.
+Overlap Compare(const std::vector<Ray>& keyframe, const std::vector<Ray>& frame) {
+  std::vector<double> angles;
+  auto other = frame.begin();
+  for (const Ray& ray : keyframe) {
+    while (other != frame.end() && other->track < ray.track) ++other;
+    if (other == frame.end()) break;
+    if (other->track != ray.track) continue;
+    const double sine = ray.direction.cross(other->direction).norm();
+    angles.push_back(std::atan2(sine, ray.direction.dot(other->direction)));
+  }
+  if (angles.empty()) return {};
+  const auto middle = angles.begin() + static_cast<std::ptrdiff_t>(angles.size() / 2);
+  std::nth_element(angles.begin(), middle, angles.end());
+  return {static_cast<double>(angles.size()) / static_cast<double>(keyframe.size()), *middle};
+}
+
+}  // namespace
+
+std::optional<std::string> KeyframeOptions::Problem() const {
+  if (!(min_parallax_deg > 0.0)) {
+    return "min_parallax_deg = " + std::to_string(min_parallax_deg) + ": must be positive";
+  }
+  if (!(min_shared_ratio >= 0.0 && min_shared_ratio < 1.0)) {
+    return "min_shared_ratio = " + std::to_string(min_shared_ratio) +
+           ": must be 0 or more and below 1";
+  }
+  return std::nullopt;
+}
+
+std::set<FrameId> SelectKeyframes(const RotationMap& cam_from_world,
+                                  const std::vector<Track>& tracks,
+                                  const std::vector<HeldStretch>& held,
+                                  const KeyframeOptions& options) {
+  if (const auto problem = options.Problem())
+    throw std::invalid_argument("KeyframeOptions: " + *problem);
+  std::set<FrameId> keyframes;
+  if (cam_from_world.empty()) return keyframes;
+  const auto rays_of = RaysOfFrames(cam_from_world, tracks);
+  static const std::vector<Ray> kNoRays;
+  const auto rays = [&](FrameId frame) -> const std::vector<Ray>& {
+    const auto entry = rays_of.find(frame);
+    return entry == rays_of.end() ? kNoRays : entry->second;
+  };
+  FrameId keyframe = cam_from_world.begin()->first;
+  FrameId before = keyframe;  // newest frame that could still become a keyframe
+  keyframes.insert(keyframe);
+  const auto take = [&](FrameId frame) {
+    keyframes.insert(frame);
+    keyframe = frame;
+  };
+  for (const auto& [frame, rotation] : cam_from_world) {
+    const auto stretch =
+        std::find_if(held.begin(), held.end(), [&, f = frame](const HeldStretch& s) {
+          return s.first <= f && f <= s.last;
+        });
+    if (stretch != held.end()) {
+      if (frame == stretch->first || frame == stretch->last) take(frame);
+      before = frame;
+      continue;
+    }
+    if (rays(frame).empty()) continue;
+    Overlap overlap = Compare(rays(keyframe), rays(frame));
+    if (overlap.shared_ratio < options.min_shared_ratio && before > keyframe) {
+      // Too late: the frame before still shares enough.
+      take(before);
+      overlap = Compare(rays(keyframe), rays(frame));
+    }
+    if (overlap.parallax_rad >= options.min_parallax_deg * kRadFromDeg ||
+        overlap.shared_ratio < options.min_shared_ratio) {
+      take(frame);
+    }
+    before = frame;
+  }
+  keyframes.insert(cam_from_world.rbegin()->first);
+  return keyframes;
+}
+
+std::vector<Track> RestrictTracks(const std::vector<Track>& tracks,
+                                  const std::set<FrameId>& frames,
+                                  int min_length) {
+  std::vector<Track> restricted;
+  for (const Track& track : tracks) {
+    Track kept = track;
+    std::erase_if(kept.observations, [&](const Observation& observation) {
+      return !frames.contains(observation.frame);
+    });
+    if (static_cast<int>(kept.observations.size()) >= min_length)
+      restricted.push_back(std::move(kept));
+  }
+  return restricted;
+}
+
+}  // namespace rotslam

@@ -1,0 +1,46 @@
+#pragma once
+
+#include <optional>
+#include <set>
+#include <string>
+#include <vector>
+
+#include "rotodom/types/held_stretch.h"
+#include "rotodom/types/maps.h"
+#include "rotodom/types/track.h"
+
+namespace rotslam {
+
+struct KeyframeOptions {
+  // A frame becomes a keyframe when the median angle between its rays and the last keyframe's,
+  // rotation taken out, has grown to this: less gives more keyframes than triangulation gains from.
+  double min_parallax_deg = 2.0;
+  // It becomes one before fewer than this share of the last keyframe's tracks is left, so that
+  // tracks link neighbouring keyframes.
+  double min_shared_ratio = 0.35;
+
+  std::optional<std::string> Problem() const;
+
+  template <class Visitor>
+  void Visit(Visitor&& visit) {
+    visit("min_parallax_deg", min_parallax_deg);
+    visit("min_shared_ratio", min_shared_ratio);
+  }
+};
+
+/// Chooses the frames that carry the map. The first and the last frame of `cam_from_world` and of
+/// every held stretch are keyframes; inside a stretch there are no others.
+/// @param tracks  over all frames, not only keyframes.
+/// Cost:    linear in the number of observations.
+std::set<FrameId> SelectKeyframes(const RotationMap& cam_from_world,
+                                  const std::vector<Track>& tracks,
+                                  const std::vector<HeldStretch>& held,
+                                  const KeyframeOptions& options);
+
+/// The tracks with their observations in `frames` only; tracks left with fewer than `min_length`
+/// go.
+std::vector<Track> RestrictTracks(const std::vector<Track>& tracks,
+                                  const std::set<FrameId>& frames,
+                                  int min_length);
+
+}  // namespace rotslam

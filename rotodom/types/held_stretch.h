@@ -1,0 +1,14 @@
+#pragma once
+
+#include "rotodom/types/ids.h"
+
+namespace rotslam {
+
+/// A run of frames during which the camera does not change its place.
+struct HeldStretch {
+  FrameId first;  // its place is the place of all
+  FrameId last;
+  double evidence = 0.0;  // mean share of the edges across its steps that show no baseline
+};
+
+}  // namespace rotslam

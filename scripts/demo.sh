@@ -1,0 +1,35 @@
+#!/usr/bin/env bash
+# From a fresh Debian 12 to a trajectory and a point cloud: installs what is missing, builds Release, renders the
+# built-in sequence (the camera walks, stops, turns to an entirely new view, walks on), solves it and compares with the
+# exact truth. A second run skips what is done. Writes below build/release and runs/demo.
+set -euo pipefail
+cd "$(dirname "$0")/.."
+
+scripts/install_packages.sh
+
+if command -v ccache >/dev/null; then
+  export CMAKE_CXX_COMPILER_LAUNCHER=${CMAKE_CXX_COMPILER_LAUNCHER:-ccache}
+fi
+cmake --preset release >/dev/null
+cmake --build --preset release --target rotslam
+
+rotslam=build/release/apps/rotslam
+sequence=runs/demo/sequence
+result=runs/demo/result
+truth=$sequence/groundtruth_tum.txt
+summary=$result/summary.json
+
+if [[ ! $truth -nt $rotslam ]]; then
+  "$rotslam" simulate gimbal --out "$sequence"
+fi
+if [[ ! $summary -nt $truth ]]; then
+  "$rotslam" run "$sequence" --camera "$sequence/camera.yaml" --out "$result"
+fi
+
+images=$(grep -c '^[^#]' "$truth")
+echo
+echo "accuracy against the exact truth:"
+"$rotslam" eval "$truth" "$result/trajectory_tum.txt" --images "$images"
+echo
+echo "written to $PWD/$result:"
+ls -1 "$result"

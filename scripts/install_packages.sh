@@ -1,0 +1,52 @@
+#!/usr/bin/env bash
+# Installs the Debian packages that rotslam needs and that are missing; the only list of them.
+#   scripts/install_packages.sh        what building, running and testing takes
+#   scripts/install_packages.sh --ci   and what only continuous integration takes
+# Works as root or through sudo; asks the network for nothing when all is there.
+set -euo pipefail
+
+packages=(
+  # tools
+  cmake g++ ninja-build pkg-config
+  # rotodom
+  libeigen3-dev libopencv-dev libyaml-cpp-dev
+  # krot and ba
+  coinor-libclp-dev libceres-dev
+  # output and apps
+  libcli11-dev libpcl-dev nlohmann-json3-dev
+  # tests; OpenGV to compare with, numpy for the independent check of `rotslam eval`
+  libgmock-dev libgtest-dev libopengv-dev python3-numpy
+)
+if [[ ${1:-} == --ci ]]; then
+  packages+=(clang-format-14)
+elif [[ $# -gt 0 ]]; then
+  echo "usage: ${0##*/} [--ci]" >&2
+  exit 2
+fi
+
+if ! command -v dpkg-query >/dev/null || ! command -v apt-get >/dev/null; then
+  echo "${0##*/}: this is not Debian; install what corresponds to: ${packages[*]}" >&2
+  exit 1
+fi
+
+missing=()
+for package in "${packages[@]}"; do
+  status=$(dpkg-query --show --showformat='${db:Status-Status}' "$package" 2>/dev/null || true)
+  [[ $status == installed ]] || missing+=("$package")
+done
+if [[ ${#missing[@]} -eq 0 ]]; then
+  exit 0
+fi
+
+as_root=()
+if [[ $(id -u) -ne 0 ]]; then
+  if ! command -v sudo >/dev/null; then
+    echo "${0##*/}: needs root or sudo to install: ${missing[*]}" >&2
+    exit 1
+  fi
+  as_root=(sudo)
+fi
+echo "installing: ${missing[*]}"
+"${as_root[@]}" apt-get update -qq
+"${as_root[@]}" env DEBIAN_FRONTEND=noninteractive \
+  apt-get install -qq -y --no-install-recommends "${missing[@]}"

@@ -1,0 +1,315 @@
+#include "ba/bundle_adjustment.h"
+
+#include <cstring>
+
+#include <gtest/gtest.h>
+
+#include "tests/ba/ba_scene.h"
+
+namespace rotslam {
+namespace {
+
+bool SameBits(const Eigen::Vector3d& a, const Eigen::Vector3d& b) {
+  return std::memcmp(a.data(), b.data(), sizeof(double) * 3) == 0;
+}
+
+bool SameBits(const Rotation& a, const Rotation& b) {
+  return std::memcmp(a.Quaternion().coeffs().data(),
+                     b.Quaternion().coeffs().data(),
+                     sizeof(double) * 4) == 0;
+}
+
+bool SameBits(const Reconstruction& a, const Reconstruction& b) {
+  if (a.cam_from_world.size() != b.cam_from_world.size() ||
+      a.center_in_world.size() != b.center_in_world.size() ||
+      a.point_in_world.size() != b.point_in_world.size()) {
+    return false;
+  }
+  for (const auto& [id, value] : a.cam_from_world) {
+    if (!SameBits(value, b.cam_from_world.at(id))) return false;
+  }
+  for (const auto& [id, value] : a.center_in_world) {
+    if (!SameBits(value, b.center_in_world.at(id))) return false;
+  }
+  for (const auto& [id, value] : a.point_in_world) {
+    if (!SameBits(value, b.point_in_world.at(id))) return false;
+  }
+  return true;
+}
+
+TEST(RefineBundle, FindsTheTruthOnACleanStreet) {
+  const BaScene scene = MakeBaScene({});
+  // Twenty metres of path: 0.2 deg and up to a metre off.
+  const BundleResult result = RefineBundle(PerturbedProblem(scene, 0.2, 1.0), ExactOptions());
+  ASSERT_TRUE(result.Usable()) << result.message;
+  EXPECT_LT(CenterError(result.reconstruction, scene.truth), 1e-6);
+  EXPECT_LT(MaxRotationErrorDeg(result.reconstruction, scene.truth), 1e-5);
+  EXPECT_LT(result.summary.after.rms_px, 1e-4);
+  EXPECT_GT(result.summary.before.rms_px, 1.0);
+  EXPECT_EQ(result.summary.rounds.size(), 3U);
+  EXPECT_TRUE(result.weak_frames.empty());
+  EXPECT_GT(result.summary.num_points, 380);  // all but the shallow ones
+}
+
+TEST(RefineBundle, KeepsTheFirstPoseAndTheScaleOfTheStart) {
+  const BaScene scene = MakeBaScene({.noise_px = 0.5});
+  const BundleProblem problem = PerturbedProblem(scene, 0.1, 0.3);
+  const BundleResult result = RefineBundle(problem, ExactOptions());
+  ASSERT_TRUE(result.Usable()) << result.message;
+  const FrameId first{0};
+  const FrameId last{19};
+  EXPECT_TRUE(SameBits(result.reconstruction.cam_from_world.at(first),
+                       problem.start.cam_from_world.at(first)));
+  EXPECT_TRUE(SameBits(result.reconstruction.center_in_world.at(first),
+                       problem.start.center_in_world.at(first)));
+  // Along the line between them the distance stays; across it, it may turn.
+  const double before =
+      (problem.start.center_in_world.at(last) - problem.start.center_in_world.at(first)).norm();
+  const double after = (result.reconstruction.center_in_world.at(last) -
+                        result.reconstruction.center_in_world.at(first))
+                           .norm();
+  EXPECT_NEAR(after / before, 1.0, 2e-3);
+}
+
+TEST(RefineBundle, RemovesOutliersAndStaysNearTheRunWithoutThem) {
+  const BaSceneOptions options = {.noise_px = 0.5};
+  BaSceneOptions with_outliers = options;
+  with_outliers.outlier_ratio = 0.05;
+  const BaScene clean = MakeBaScene(options);
+  const BaScene dirty = MakeBaScene(with_outliers);
+  const BundleResult a = RefineBundle(PerturbedProblem(clean, 0.1, 0.5), {});
+  const BundleResult b = RefineBundle(PerturbedProblem(dirty, 0.1, 0.5), {});
+  ASSERT_TRUE(a.Usable() && b.Usable());
+  int kept_outliers = 0;
+  int kept_inliers = 0;
+  int num_inliers = 0;
+  for (const Track& track : b.reconstruction.tracks) {
+    for (const Observation& observation : track.observations) {
+      const bool outlier = dirty.outliers.contains({track.id, observation.frame});
+      ++(outlier ? kept_outliers : kept_inliers);
+    }
+  }
+  for (const Track& track : dirty.truth.tracks) {
+    num_inliers += static_cast<int>(track.observations.size());
+  }
+  num_inliers -= static_cast<int>(dirty.outliers.size());
+  EXPECT_LE(kept_outliers, 0.02 * static_cast<double>(dirty.outliers.size()));
+  EXPECT_GT(kept_inliers, 0.95 * num_inliers);
+  EXPECT_LT(CenterError(b.reconstruction, dirty.truth),
+            1.5 * CenterError(a.reconstruction, clean.truth) + 1e-4);
+}
+
+TEST(RefineBundle, ForgetsTheNamesOfFramesAndTracks) {
+  const BaScene scene = MakeBaScene({.noise_px = 0.5});
+  const BundleProblem problem = PerturbedProblem(scene, 0.1, 0.3);
+  // Frame k becomes 100 - k, which also makes another frame the first, and track order turns round.
+  const auto renamed = [](FrameId frame) { return FrameId{100 - frame.value}; };
+  BundleProblem other;
+  other.camera = problem.camera;
+  for (const auto& [frame, value] : problem.start.cam_from_world) {
+    other.start.cam_from_world[renamed(frame)] = value;
+    other.start.center_in_world[renamed(frame)] = problem.start.center_in_world.at(frame);
+  }
+  for (Track track : problem.start.tracks) {
+    track.id = TrackId{1000 - track.id.value};
+    std::reverse(track.observations.begin(), track.observations.end());
+    for (Observation& observation : track.observations) {
+      observation.frame = renamed(observation.frame);
+    }
+    other.start.tracks.insert(other.start.tracks.begin(), track);
+  }
+  const Reconstruction a = RefineBundle(problem, ExactOptions()).reconstruction;
+  const Reconstruction b = RefineBundle(other, ExactOptions()).reconstruction;
+  // Pairs only: neither the world's pose nor its scale enters.
+  const auto ratio = [&](const Reconstruction& r, FrameId i, FrameId j, FrameId k) {
+    return (r.center_in_world.at(i) - r.center_in_world.at(j)).norm() /
+           (r.center_in_world.at(i) - r.center_in_world.at(k)).norm();
+  };
+  for (int k = 1; k + 1 < 20; ++k) {
+    const FrameId i{0};
+    const FrameId j{k};
+    const FrameId l{19};
+    const Rotation pair_a = a.cam_from_world.at(j) * a.cam_from_world.at(i).Inverse();
+    const Rotation pair_b =
+        b.cam_from_world.at(renamed(j)) * b.cam_from_world.at(renamed(i)).Inverse();
+    EXPECT_LT((pair_a * pair_b.Inverse()).AngleDeg(), 1e-5);
+    EXPECT_NEAR(ratio(a, i, j, l), ratio(b, renamed(i), renamed(j), renamed(l)), 1e-6);
+  }
+}
+
+TEST(RefineBundle, HoldsOnePositionThroughAPureRotation) {
+  const BaScene scene = MakeBaScene(
+      {.num_frames = 24, .num_points = 600, .noise_px = 0.0, .still_first = 10, .still_last = 16});
+  BundleProblem problem = PerturbedProblem(scene, 0.1, 0.3);
+  for (int k = 11; k <= 16; ++k) problem.shared_center[FrameId{k}] = FrameId{k - 1};  // a chain
+  const BundleResult result = RefineBundle(problem, ExactOptions());
+  ASSERT_TRUE(result.Usable()) << result.message;
+  const Reconstruction& out = result.reconstruction;
+  for (int k = 11; k <= 16; ++k) {
+    EXPECT_TRUE(SameBits(out.center_in_world.at(FrameId{k}), out.center_in_world.at(FrameId{10})));
+  }
+  EXPECT_LT(CenterError(out, scene.truth), 1e-6);
+  EXPECT_LT(MaxRotationErrorDeg(out, scene.truth), 1e-5);
+}
+
+TEST(RefineBundle, TracksSeenFromOnePlaceHoldRotationsTogether) {
+  // Frames 10..16 turn in place; tracks that cross to the moving part are cut, so only directions
+  // tie the rotations of the stretch to one another.
+  const BaScene scene =
+      MakeBaScene({.num_frames = 24, .num_points = 1200, .still_first = 10, .still_last = 16});
+  BundleProblem problem = PerturbedProblem(scene, 0.1, 0.0);
+  for (int k = 11; k <= 16; ++k) problem.shared_center[FrameId{k}] = FrameId{10};
+  for (Track& track : problem.start.tracks) {
+    std::erase_if(track.observations, [&](const Observation& observation) {
+      const bool inside = observation.frame.value > 10 && observation.frame.value <= 16;
+      return track.id.value % 2 == 0 ? inside
+                                     : observation.frame.value < 10 || observation.frame.value > 16;
+    });
+  }
+  const BundleResult result = RefineBundle(problem, ExactOptions());
+  ASSERT_TRUE(result.Usable()) << result.message;
+  EXPECT_GT(result.summary.rounds.back().num_directions, 50);
+  EXPECT_LT(MaxRotationErrorDeg(result.reconstruction, scene.truth), 1e-4);
+}
+
+TEST(RefineBundle, FixedFramesDoNotMoveAndCarryTheGauge) {
+  const BaScene scene = MakeBaScene({.noise_px = 0.0});
+  BundleProblem problem = PerturbedProblem(scene, 0.1, 0.3);
+  for (int k = 0; k < 5; ++k) {
+    const FrameId frame{k};
+    problem.fixed_frames.insert(frame);
+    problem.start.cam_from_world[frame] = scene.truth.cam_from_world.at(frame);
+    problem.start.center_in_world[frame] = scene.truth.center_in_world.at(frame);
+  }
+  const BundleResult result = RefineBundle(problem, ExactOptions());
+  ASSERT_TRUE(result.Usable()) << result.message;
+  for (const FrameId frame : problem.fixed_frames) {
+    EXPECT_TRUE(SameBits(result.reconstruction.cam_from_world.at(frame),
+                         problem.start.cam_from_world.at(frame)));
+    EXPECT_TRUE(SameBits(result.reconstruction.center_in_world.at(frame),
+                         problem.start.center_in_world.at(frame)));
+  }
+  for (const auto& [frame, center] : result.reconstruction.center_in_world) {
+    EXPECT_LT((center - scene.truth.center_in_world.at(frame)).norm(), 1e-5) << frame.value;
+  }
+}
+
+TEST(RefineBundle, KnownRotationModeKeepsRotationsToTheLastBit) {
+  const BaScene scene = MakeBaScene({.noise_px = 0.0});
+  const BundleProblem problem = PerturbedProblem(scene, 0.0, 1.0);
+  BundleOptions options = ExactOptions();
+  options.refine_rotations = false;
+  const BundleResult result = RefineBundle(problem, options);
+  ASSERT_TRUE(result.Usable()) << result.message;
+  for (const auto& [frame, cam_from_world] : problem.start.cam_from_world) {
+    EXPECT_TRUE(SameBits(result.reconstruction.cam_from_world.at(frame), cam_from_world));
+  }
+  EXPECT_LT(CenterError(result.reconstruction, scene.truth), 1e-6);
+}
+
+TEST(RefineBundle, GivesTheSameBytesAtAnyNumberOfThreads) {
+  const BaScene scene = MakeBaScene({.noise_px = 0.5, .outlier_ratio = 0.05});
+  const BundleProblem problem = PerturbedProblem(scene, 0.1, 0.5);
+  BundleOptions options;
+  const BundleResult one = RefineBundle(problem, options);
+  std::vector<std::vector<double>> ballast;  // moves later allocations to other addresses
+  for (const int threads : {1, 2, 4, 1, 2, 4}) {
+    options.num_threads = threads;
+    ballast.emplace_back(1000 * ballast.size() + 7);
+    EXPECT_TRUE(SameBits(RefineBundle(problem, options).reconstruction, one.reconstruction))
+        << threads;
+  }
+}
+
+TEST(RefineBundle, DenseAndSparseSolversAgree) {
+  const BaScene scene = MakeBaScene({.noise_px = 0.5});
+  const BundleProblem problem = PerturbedProblem(scene, 0.1, 0.3);
+  BundleOptions options = ExactOptions();
+  options.max_dense_frames = 1000;
+  const BundleResult dense = RefineBundle(problem, options);
+  options.max_dense_frames = 0;
+  const BundleResult sparse = RefineBundle(problem, options);
+  EXPECT_NEAR(dense.summary.final_cost, sparse.summary.final_cost, 1e-9 * dense.summary.final_cost);
+  for (const auto& [frame, center] : dense.reconstruction.center_in_world) {
+    EXPECT_LT((center - sparse.reconstruction.center_in_world.at(frame)).norm(), 1e-5);
+  }
+}
+
+TEST(RefineBundle, FramesWithTooFewObservationsAreNamedAndLoseTheirPlace) {
+  const BaScene scene = MakeBaScene({});
+  BundleProblem problem = PerturbedProblem(scene, 0.1, 0.3);
+  const FrameId lonely{7};
+  int left = 5;
+  for (Track& track : problem.start.tracks) {
+    std::erase_if(track.observations,
+                  [&](const Observation& o) { return o.frame == lonely && left-- <= 0; });
+  }
+  const BundleResult result = RefineBundle(problem, ExactOptions());
+  ASSERT_TRUE(result.Usable()) << result.message;
+  EXPECT_EQ(result.weak_frames, std::vector<FrameId>{lonely});
+  EXPECT_TRUE(result.reconstruction.cam_from_world.contains(lonely));
+  EXPECT_FALSE(result.reconstruction.center_in_world.contains(lonely));
+  EXPECT_LT(CenterError(result.reconstruction, scene.truth), 1e-6);
+}
+
+TEST(RefineBundle, SaysSoWhenThereIsTooLittle) {
+  const BaScene scene = MakeBaScene({});
+  BundleProblem empty;
+  empty.camera = scene.camera;
+  EXPECT_EQ(RefineBundle(empty, {}).status, BundleStatus::kTooLittleData);
+  BundleProblem no_tracks = PerturbedProblem(scene, 0.0, 0.0);
+  no_tracks.start.tracks.clear();
+  EXPECT_FALSE(RefineBundle(no_tracks, {}).Usable());
+  // All cameras in one place: no depth anywhere.
+  BundleProblem one_place = PerturbedProblem(scene, 0.0, 0.0);
+  for (auto& [frame, center] : one_place.start.center_in_world) center.setZero();
+  const BundleResult result = RefineBundle(one_place, {});
+  EXPECT_EQ(result.status, BundleStatus::kTooLittleData);
+  EXPECT_EQ(result.reconstruction.center_in_world.size(), scene.truth.center_in_world.size());
+  BundleProblem all_fixed = PerturbedProblem(scene, 0.0, 0.0);
+  for (const auto& [frame, center] : all_fixed.start.center_in_world) {
+    all_fixed.fixed_frames.insert(frame);
+  }
+  EXPECT_EQ(RefineBundle(all_fixed, {}).status, BundleStatus::kTooLittleData);
+}
+
+TEST(RefineBundle, RefusesBrokenContracts) {
+  const BaScene scene = MakeBaScene({.num_frames = 5, .num_points = 30});
+  const BundleProblem good = PerturbedProblem(scene, 0.0, 0.0);
+  const auto refuses = [&](const auto& damage) {
+    BundleProblem problem = good;
+    damage(problem);
+    EXPECT_THROW(RefineBundle(problem, {}), std::invalid_argument);
+  };
+  const double nan = std::numeric_limits<double>::quiet_NaN();
+  refuses([&](BundleProblem& p) { p.start.center_in_world[FrameId{2}].x() = nan; });
+  refuses([&](BundleProblem& p) { p.start.point_in_world[TrackId{2}] = {nan, 0.0, 0.0}; });
+  refuses([&](BundleProblem& p) { p.start.tracks[0].observations[0].keypoint_px.x() = nan; });
+  refuses([&](BundleProblem& p) { p.start.tracks[0].observations[0].sigma_px = 0.0; });
+  refuses([&](BundleProblem& p) { p.start.tracks[1].id = p.start.tracks[0].id; });
+  refuses([&](BundleProblem& p) {
+    p.start.tracks[0].observations.push_back(p.start.tracks[0].observations[0]);
+  });
+  refuses([&](BundleProblem& p) { p.fixed_frames.insert(FrameId{99}); });
+  refuses([&](BundleProblem& p) { p.shared_center[FrameId{1}] = FrameId{99}; });
+  refuses([&](BundleProblem& p) {
+    p.shared_center = {{FrameId{1}, FrameId{2}}, {FrameId{2}, FrameId{1}}};
+  });
+  refuses([&](BundleProblem& p) { p.camera.fx = 0.0; });
+  BundleOptions options;
+  options.fine.loss = "tukey";
+  EXPECT_EQ(options.Problem(), "fine.loss is tukey, must be huber, cauchy or none");
+  EXPECT_THROW(RefineBundle(good, options), std::invalid_argument);
+}
+
+TEST(WithoutShallowPoints, KeepsOnlyPointsWhoseRaysMeet) {
+  const BaScene scene = MakeBaScene({});
+  const Reconstruction deep = WithoutShallowPoints(scene.truth, 5.0);
+  EXPECT_LT(deep.tracks.size(), scene.truth.tracks.size());
+  EXPECT_GT(deep.tracks.size(), scene.truth.tracks.size() / 10);
+  EXPECT_EQ(deep.tracks.size(), deep.point_in_world.size());
+  EXPECT_EQ(deep.center_in_world.size(), scene.truth.center_in_world.size());
+}
+
+}  // namespace
+}  // namespace rotslam

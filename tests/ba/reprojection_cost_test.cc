@@ -1,0 +1,135 @@
+#include "ba/reprojection_cost.h"
+
+#include <ceres/manifold_test_utils.h>
+#include <gtest/gtest.h>
+
+#include "rotodom/types/rotation.h"
+#include "tests/ba/ba_scene.h"
+
+namespace rotslam {
+namespace {
+
+class ReprojectionForEveryCamera : public ::testing::TestWithParam<CameraModel> {};
+INSTANTIATE_TEST_SUITE_P(Models,
+                         ReprojectionForEveryCamera,
+                         ::testing::Values(CameraModel::kPinhole,
+                                           CameraModel::kRadtan,
+                                           CameraModel::kEquidistant));
+
+TEST_P(ReprojectionForEveryCamera, JacobianOfReprojectEqualsCentralDifferences) {
+  const Camera camera = BaCamera(GetParam());
+  const Rotation cam_from_world = Rotation::Exp({0.3, -0.2, 0.1});
+  const Eigen::Vector3d center(0.4, -0.3, 0.2);
+  const Eigen::Vector3d point = cam_from_world.Inverse() * Eigen::Vector3d(1.1, -0.7, 4.0) + center;
+  ReprojectionJacobian J;
+  ASSERT_TRUE(Reproject(camera, cam_from_world.Matrix(), center, point, &J));
+  const double step = 1e-5;
+  for (int axis = 0; axis < 3; ++axis) {
+    const Eigen::Vector3d delta = step * Eigen::Vector3d::Unit(axis);
+    const auto difference = [&](const auto& at) -> Eigen::Vector2d {
+      return (*at(delta) - *at(-delta)) / (2.0 * step);
+    };
+    const Eigen::Vector2d by_rotation = difference([&](const Eigen::Vector3d& d) {
+      return Reproject(camera, (Rotation::Exp(d) * cam_from_world).Matrix(), center, point);
+    });
+    const Eigen::Vector2d by_center = difference([&](const Eigen::Vector3d& d) {
+      return Reproject(camera, cam_from_world.Matrix(), center + d, point);
+    });
+    const Eigen::Vector2d by_point = difference([&](const Eigen::Vector3d& d) {
+      return Reproject(camera, cam_from_world.Matrix(), center, point + d);
+    });
+    EXPECT_LT((J.by_rotation.col(axis) - by_rotation).norm(), 1e-6 * J.by_rotation.norm());
+    EXPECT_LT((J.by_center.col(axis) - by_center).norm(), 1e-6 * J.by_center.norm());
+    EXPECT_LT((J.by_point.col(axis) - by_point).norm(), 1e-6 * J.by_point.norm());
+  }
+}
+
+// Ambient derivatives of a cost function against central differences.
+void ExpectJacobiansAgree(const ceres::CostFunction& cost, std::vector<std::vector<double>> at) {
+  const int num_residuals = cost.num_residuals();
+  const auto evaluate = [&](double** jacobians) {
+    std::vector<const double*> parameters;
+    for (const auto& block : at) parameters.push_back(block.data());
+    Eigen::VectorXd residuals(num_residuals);
+    EXPECT_TRUE(cost.Evaluate(parameters.data(), residuals.data(), jacobians));
+    return residuals;
+  };
+  std::vector<std::vector<double>> storage;
+  std::vector<double*> jacobians;
+  for (const auto& block : at) storage.emplace_back(num_residuals * block.size());
+  for (auto& block : storage) jacobians.push_back(block.data());
+  evaluate(jacobians.data());
+  const double step = 1e-5;
+  for (std::size_t b = 0; b < at.size(); ++b) {
+    for (std::size_t k = 0; k < at[b].size(); ++k) {
+      const double value = at[b][k];
+      at[b][k] = value + step;
+      const Eigen::VectorXd high = evaluate(nullptr);
+      at[b][k] = value - step;
+      const Eigen::VectorXd low = evaluate(nullptr);
+      at[b][k] = value;
+      for (int r = 0; r < num_residuals; ++r) {
+        const double analytic = storage[b][r * at[b].size() + k];
+        EXPECT_NEAR(analytic, (high[r] - low[r]) / (2.0 * step), 1e-5 * (1.0 + std::abs(analytic)))
+            << "block " << b << ", column " << k << ", residual " << r;
+      }
+    }
+  }
+}
+
+TEST_P(ReprojectionForEveryCamera, JacobiansOfCostsEqualCentralDifferences) {
+  const Camera camera = BaCamera(GetParam());
+  const Eigen::Vector4d q = Rotation::Exp({0.3, -0.2, 0.1}).Quaternion().coeffs();
+  const std::vector<double> quaternion(q.data(), q.data() + 4);
+  ExpectJacobiansAgree(ReprojectionCost(camera, {600.0, 200.0}, 0.7),
+                       {quaternion, {0.4, -0.3, 0.2}, {1.1, -0.7, 4.0}});
+  ExpectJacobiansAgree(DirectionCost(camera, {600.0, 200.0}, 1.3), {quaternion, {0.4, -0.3, 2.0}});
+}
+
+TEST(ScaleAnchorCost, IsZeroAtTheStartAndItsJacobianEqualsCentralDifferences) {
+  const ScaleAnchorCost cost({1.0, 2.0, 3.0}, {4.0, 6.0, 3.5}, 100.0);
+  const double start[3] = {4.0, 6.0, 3.5};
+  const double* parameters[1] = {start};
+  double residual = 1.0;
+  ASSERT_TRUE(cost.Evaluate(parameters, &residual, nullptr));
+  EXPECT_NEAR(residual, 0.0, 1e-12);
+  ExpectJacobiansAgree(cost, {{3.0, 5.0, 2.0}});
+}
+
+TEST(LeftRotationManifold, KeepsCeresLawsOfAManifold) {
+  using namespace ceres;  // the macro below names its matchers without it
+  const LeftRotationManifold manifold;
+  const Eigen::Vector4d q_x = Rotation::Exp({0.5, -1.2, 0.3}).Quaternion().coeffs();
+  const Eigen::Vector4d q_y = Rotation::Exp({0.2, -0.9, 0.8}).Quaternion().coeffs();
+  const Eigen::VectorXd x = q_x;
+  const Eigen::VectorXd y = q_y;
+  const Eigen::VectorXd delta = Eigen::Vector3d(0.1, -0.05, 0.2);
+  EXPECT_THAT_MANIFOLD_INVARIANTS_HOLD(manifold, x, delta, y, 1e-6);
+}
+
+TEST(LeftRotationManifold, ComposesOnTheLeftAsRotationDoes) {
+  const Rotation start = Rotation::Exp({0.5, -1.2, 0.3});
+  const Eigen::Vector3d delta(0.1, -0.05, 0.2);
+  Eigen::Quaterniond plus;
+  ASSERT_TRUE(LeftRotationManifold().Plus(
+      start.Quaternion().coeffs().data(), delta.data(), plus.coeffs().data()));
+  EXPECT_LT((Rotation(plus) * (Rotation::Exp(delta) * start).Inverse()).Angle(), 1e-14);
+}
+
+TEST(ReprojectionCost, PointBehindTheCameraCostsButDoesNotPull) {
+  const Camera camera = BaCamera();
+  const ReprojectionCost cost(camera, {600.0, 200.0}, 2.0);
+  const double q[4] = {0.0, 0.0, 0.0, 1.0};
+  const double center[3] = {0.0, 0.0, 0.0};
+  const double point[3] = {0.1, 0.2, -3.0};
+  const double* parameters[3] = {q, center, point};
+  double residuals[2];
+  double J_point[6];
+  double* jacobians[3] = {nullptr, nullptr, J_point};
+  ASSERT_TRUE(cost.Evaluate(parameters, residuals, jacobians));
+  EXPECT_EQ(residuals[0], kUnseenResidual_px / 2.0);
+  for (const double value : J_point) EXPECT_EQ(value, 0.0);
+}
+
+}  // namespace
+}  // namespace rotslam

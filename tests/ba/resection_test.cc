@@ -1,0 +1,166 @@
+#include "ba/resection.h"
+
+#include <gtest/gtest.h>
+
+#include "tests/ba/ba_scene.h"
+
+namespace rotslam {
+namespace {
+
+struct View {
+  Camera camera;
+  Rotation cam_from_world;
+  Eigen::Vector3d center_in_world;
+  std::vector<PointSighting> sightings;
+};
+
+View MakeView(CameraModel model, int num_points, double noise_px, double outlier_ratio) {
+  std::mt19937 random(7);
+  std::normal_distribution<double> normal;
+  std::uniform_real_distribution<double> uniform(0.0, 1.0);
+  View view;
+  view.camera = BaCamera(model);
+  view.cam_from_world = Rotation::Exp({0.2, -0.7, 0.1});
+  view.center_in_world = {3.0, -1.0, 12.0};
+  for (int k = 0; k < num_points; ++k) {
+    const Eigen::Vector3d p(
+        8.0 * uniform(random) - 4.0, 4.0 * uniform(random) - 2.0, 8.0 + 20.0 * uniform(random));
+    PointSighting sighting;
+    sighting.point_in_world = view.cam_from_world.Inverse() * p + view.center_in_world;
+    sighting.keypoint_px = *view.camera.Project(p);
+    sighting.keypoint_px += noise_px * Eigen::Vector2d(normal(random), normal(random));
+    if (uniform(random) < outlier_ratio) {
+      sighting.keypoint_px = {1240.0 * uniform(random), 376.0 * uniform(random)};
+    }
+    sighting.sigma_px = noise_px > 0.0 ? noise_px : 1.0;
+    view.sightings.push_back(sighting);
+  }
+  return view;
+}
+
+ResectionStart NearStart(const View& view, double angle_deg, double offset) {
+  ResectionStart start;
+  start.cam_from_world =
+      Rotation::Exp(angle_deg * kRadFromDeg * Eigen::Vector3d(0.6, -0.64, 0.48)) *
+      view.cam_from_world;
+  start.center_in_world = view.center_in_world + offset * Eigen::Vector3d(0.48, 0.6, -0.64);
+  return start;
+}
+
+double AngleErrorDeg(const ResectedPose& pose, const View& view) {
+  return (pose.cam_from_world * view.cam_from_world.Inverse()).AngleDeg();
+}
+
+class ResectionForEveryCamera : public ::testing::TestWithParam<CameraModel> {};
+INSTANTIATE_TEST_SUITE_P(Models,
+                         ResectionForEveryCamera,
+                         ::testing::Values(CameraModel::kPinhole,
+                                           CameraModel::kRadtan,
+                                           CameraModel::kEquidistant));
+
+TEST_P(ResectionForEveryCamera, CleanSightingsGiveTheTruth) {
+  const View view = MakeView(GetParam(), 100, 0.0, 0.0);
+  const auto pose = ResectFrame(view.camera, view.sightings, NearStart(view, 2.0, 0.8), {});
+  ASSERT_TRUE(pose);
+  EXPECT_LT(AngleErrorDeg(*pose, view), 1e-8);
+  EXPECT_LT((pose->center_in_world - view.center_in_world).norm(), 1e-9 * 20.0);
+  EXPECT_EQ(pose->num_inliers, 100);
+}
+
+// Squared error in units of the covariance: 6 on average, above 22.5 once in a thousand.
+double SquaredMahalanobis(const ResectedPose& pose, const View& view) {
+  Eigen::Matrix<double, 6, 1> error;
+  error << (pose.cam_from_world * view.cam_from_world.Inverse()).Log(),
+      pose.center_in_world - view.center_in_world;
+  return error.dot(pose.covariance.inverse() * error);
+}
+
+TEST(ResectFrame, ThirtyPercentOutliersDoNoHarm) {
+  for (const double offset : {0.1, 0.5, 2.0}) {
+    const View view = MakeView(CameraModel::kPinhole, 500, 0.5, 0.3);
+    const auto pose = ResectFrame(view.camera, view.sightings, NearStart(view, 1.0, offset), {});
+    ASSERT_TRUE(pose);
+    EXPECT_NEAR(pose->num_inliers, 350, 30);
+    EXPECT_LT(SquaredMahalanobis(*pose, view), 22.5);
+  }
+}
+
+TEST(ResectFrame, CovarianceTellsTheErrorToExpect) {
+  // Mean of the squared error in its own covariance's unit, over 100 draws of noise: 6 unknowns.
+  View view = MakeView(CameraModel::kPinhole, 200, 0.0, 0.0);
+  const std::vector<PointSighting> clean = view.sightings;
+  std::mt19937 random(3);
+  std::normal_distribution<double> normal(0.0, 0.5);
+  double sum = 0.0;
+  for (int draw = 0; draw < 100; ++draw) {
+    view.sightings = clean;
+    for (PointSighting& sighting : view.sightings) {
+      sighting.keypoint_px += Eigen::Vector2d(normal(random), normal(random));
+      sighting.sigma_px = 0.5;
+    }
+    const auto pose =
+        ResectFrame(view.camera, view.sightings, NearStart(view, 0.5, 0.2), {.loss_scale = 20.0});
+    ASSERT_TRUE(pose);
+    sum += SquaredMahalanobis(*pose, view);
+  }
+  EXPECT_NEAR(sum / 100.0, 6.0, 1.2);  // standard deviation of the mean is 0.35
+}
+
+TEST(ResectFrame, HoldsWhatItIsToldTo) {
+  const View view = MakeView(CameraModel::kPinhole, 100, 0.0, 0.0);
+  ResectionStart start = NearStart(view, 0.0, 0.8);
+  const auto centred = ResectFrame(view.camera, view.sightings, start, {.refine_rotation = false});
+  ASSERT_TRUE(centred);
+  EXPECT_EQ(centred->cam_from_world.Quaternion().coeffs(),
+            start.cam_from_world.Quaternion().coeffs());
+  EXPECT_LT((centred->center_in_world - view.center_in_world).norm(), 1e-8);
+  EXPECT_EQ((centred->covariance.topRows<3>().norm()), 0.0);
+  start = NearStart(view, 1.0, 0.0);
+  const auto turned = ResectFrame(view.camera, view.sightings, start, {.refine_center = false});
+  ASSERT_TRUE(turned);
+  EXPECT_EQ(turned->center_in_world, start.center_in_world);
+  EXPECT_LT(AngleErrorDeg(*turned, view), 1e-8);
+}
+
+TEST(ResectFrame, ATightRotationPriorHoldsTheRotation) {
+  const View view = MakeView(CameraModel::kPinhole, 200, 0.5, 0.0);
+  ResectionStart start = NearStart(view, 0.0, 0.3);
+  const auto free = ResectFrame(view.camera, view.sightings, start, {});
+  start.rotation_covariance = 1e-14 * Eigen::Matrix3d::Identity();
+  const auto tight = ResectFrame(view.camera, view.sightings, start, {});
+  start.rotation_covariance = 1e6 * Eigen::Matrix3d::Identity();
+  const auto loose = ResectFrame(view.camera, view.sightings, start, {});
+  ASSERT_TRUE(free);
+  ASSERT_TRUE(tight);
+  ASSERT_TRUE(loose);
+  EXPECT_LT(AngleErrorDeg(*tight, view), 1e-4);
+  EXPECT_GT(AngleErrorDeg(*free, view), 1e-3);
+  EXPECT_LT((loose->center_in_world - free->center_in_world).norm(), 1e-7);
+  EXPECT_LT(tight->covariance(0, 0), free->covariance(0, 0));
+}
+
+TEST(ResectFrame, SaysNoToTooLittle) {
+  const View view = MakeView(CameraModel::kPinhole, 100, 0.0, 0.0);
+  const ResectionStart start = NearStart(view, 0.5, 0.2);
+  EXPECT_FALSE(ResectFrame(view.camera, {}, start, {}));
+  const std::vector<PointSighting> few(view.sightings.begin(), view.sightings.begin() + 9);
+  EXPECT_FALSE(ResectFrame(view.camera, few, start, {}));
+  EXPECT_FALSE(
+      ResectFrame(view.camera, std::vector<PointSighting>(50, view.sightings[0]), start, {}));
+  std::vector<PointSighting> nan = view.sightings;
+  for (PointSighting& sighting : nan) sighting.keypoint_px.x() = std::nan("");
+  EXPECT_FALSE(ResectFrame(view.camera, nan, start, {}));
+  std::vector<PointSighting> behind = view.sightings;
+  for (PointSighting& sighting : behind) {
+    sighting.point_in_world = 2.0 * view.center_in_world - sighting.point_in_world;
+  }
+  EXPECT_FALSE(ResectFrame(view.camera, behind, start, {}));
+  ResectionStart broken = start;
+  broken.center_in_world.x() = std::nan("");
+  EXPECT_THROW(ResectFrame(view.camera, view.sightings, broken, {}), std::invalid_argument);
+  EXPECT_THROW(ResectFrame(view.camera, view.sightings, start, {.min_inliers = 1}),
+               std::invalid_argument);
+}
+
+}  // namespace
+}  // namespace rotslam

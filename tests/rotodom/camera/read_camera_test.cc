@@ -1,0 +1,249 @@
+#include "rotodom/camera/read_camera.h"
+
+#include <filesystem>
+#include <fstream>
+#include <sstream>
+#include <stdexcept>
+#include <string>
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+#include <unistd.h>
+
+namespace rotslam {
+namespace {
+
+namespace fs = std::filesystem;
+using testing::AllOf;
+using testing::HasSubstr;
+using testing::Not;
+
+class ReadCameraTest : public testing::Test {
+ protected:
+  void SetUp() override { fs::create_directories(folder_); }
+  void TearDown() override { fs::remove_all(folder_); }
+
+  fs::path Write(const std::string& name, const std::string& text) const {
+    std::ofstream(folder_ / name) << text;
+    return folder_ / name;
+  }
+  Camera Read(const std::string& text) const { return ReadCamera(Write("some.txt", text)); }
+
+  // What reading `text` complains about; one line that names the file.
+  std::string Complaint(const std::string& text) const {
+    try {
+      const Camera camera = Read(text);
+      return "read without complaint: " + Describe(camera);
+    } catch (const std::runtime_error& error) {
+      EXPECT_THAT(error.what(), AllOf(HasSubstr("some.txt: "), Not(HasSubstr("\n"))));
+      return error.what();
+    }
+  }
+
+  const fs::path folder_ =
+      fs::path(testing::TempDir()) / ("rotslam_read_camera_" + std::to_string(getpid()));
+};
+
+Camera Make(CameraModel model,
+            const std::array<int, 2>& size,
+            const std::array<double, 4>& intrinsics,
+            const std::array<double, 5>& distortion = {}) {
+  Camera camera;
+  camera.model = model;
+  camera.width = size[0];
+  camera.height = size[1];
+  camera.fx = intrinsics[0];
+  camera.fy = intrinsics[1];
+  camera.cx = intrinsics[2];
+  camera.cy = intrinsics[3];
+  camera.distortion = distortion;
+  return camera;
+}
+
+TEST_F(ReadCameraTest, OursGivesBackWhatWasWritten) {
+  const double third = 1.0 / 3.0;
+  for (const Camera& camera :
+       {Make(CameraModel::kPinhole, {0, 0}, {500.0 + third, 501.0, 320.1, -2.5}),
+        Make(CameraModel::kRadtan, {640, 480}, {5e2, 1e-3, 0, 1}, {third, -0.1, 1e-17, 0, 2}),
+        Make(CameraModel::kRadtan, {640, 480}, {5e2, 5e2, 0, 1}),
+        Make(CameraModel::kEquidistant, {64, 48}, {190, 191, 32, 24}, {0.1, third, -1e-9, 4})}) {
+    WriteCameraYaml(folder_ / "camera.yaml", camera);
+    EXPECT_EQ(ReadCamera(folder_ / "camera.yaml"), camera) << CameraYaml(camera);
+    EXPECT_EQ(ReadCamera(folder_), camera);  // the folder stands for it
+    EXPECT_FALSE(fs::exists(folder_ / "camera.yaml.tmp"));
+  }
+}
+
+TEST_F(ReadCameraTest, OrbSlam) {
+  EXPECT_EQ(Read("%YAML:1.0\n\n# comment\nCamera.fx: 517.306408\nCamera.fy: 516.469215\n"
+                 "Camera.cx: 318.643040\nCamera.cy: 255.313989\n\nCamera.k1: 0.262383\n"
+                 "Camera.k2: -0.953104\nCamera.p1: -0.005358\nCamera.p2: 0.002628\n"
+                 "Camera.k3: 1.163314\n\nCamera.fps: 30.0\nCamera.RGB: 1\n"
+                 "LEFT.D: !!opencv-matrix\n   rows: 1\n   cols: 2\n   dt: d\n"
+                 "   data: [-0.28, 0.07]\n"),
+            Make(CameraModel::kRadtan,
+                 {0, 0},
+                 {517.306408, 516.469215, 318.64304, 255.313989},
+                 {0.262383, -0.953104, -0.005358, 0.002628, 1.163314}));
+  EXPECT_EQ(Read("%YAML:1.0\n---\nCamera.fx: 718.856\nCamera.fy: 718.856\nCamera.cx: 607.1928\n"
+                 "Camera.cy: 185.2157\nCamera.k1: 0.0\nCamera.k2: 0.0\nCamera.p1: 0.0\n"
+                 "Camera.p2: 0.0\nCamera.width: 1241\nCamera.height: 376\n"),
+            Make(CameraModel::kPinhole, {1241, 376}, {718.856, 718.856, 607.1928, 185.2157}));
+  EXPECT_EQ(Read("%YAML:1.0\nFile.version: \"1.0\"\nCamera.type: \"KannalaBrandt8\"\n"
+                 "Camera1.fx: 190.97\nCamera1.fy: 190.98\nCamera1.cx: 254.93\n"
+                 "Camera1.cy: 256.89\nCamera1.k1: 0.0034\nCamera1.k2: 0.0007\n"
+                 "Camera1.k3: -0.002\nCamera1.k4: 0.0002\nCamera.width: 512\n"
+                 "Camera.height: 512\n"),
+            Make(CameraModel::kEquidistant,
+                 {512, 512},
+                 {190.97, 190.98, 254.93, 256.89},
+                 {0.0034, 0.0007, -0.002, 0.0002}));
+  EXPECT_THAT(Complaint("%YAML:1.0\nCamera.fy: 500\nCamera.cx: 3\nCamera.cy: 2\n"),
+              HasSubstr("Camera.fx is missing"));
+  EXPECT_THAT(Complaint("Camera.type: \"MLPnP\"\nCamera.fx: 500\n"), HasSubstr("Camera.type"));
+  EXPECT_THAT(Complaint("Camera.type: KannalaBrandt8\nCamera.fx: 500\nCamera.fy: 500\n"
+                        "Camera.cx: 500\nCamera.cy: 500\nCamera.k1: 0.1\n"),
+              HasSubstr("Camera.k2 is missing"));
+}
+
+TEST_F(ReadCameraTest, Kalibr) {
+  EXPECT_EQ(Read("cam0:\n  cam_overlaps: [1]\n  camera_model: pinhole\n"
+                 "  distortion_coeffs: [-0.28, 0.07, 0.0002, 1.7e-05]\n"
+                 "  distortion_model: radtan\n  intrinsics: [458.6, 457.2, 367.2, 248.3]\n"
+                 "  resolution: [752, 480]\n  rostopic: /cam0/image_raw\ncam1:\n"
+                 "  camera_model: pinhole\n"),
+            Make(CameraModel::kRadtan,
+                 {752, 480},
+                 {458.6, 457.2, 367.2, 248.3},
+                 {-0.28, 0.07, 0.0002, 1.7e-05}));
+  EXPECT_EQ(
+      Read("cam0: {camera_model: pinhole, distortion_model: equidistant,\n"
+           "  distortion_coeffs: [0.1, 0.2, 0.3, 0.4], intrinsics: [190, 191, 254, 256],\n"
+           "  resolution: [512, 512]}\n"),
+      Make(CameraModel::kEquidistant, {512, 512}, {190, 191, 254, 256}, {0.1, 0.2, 0.3, 0.4}));
+  EXPECT_EQ(Read("cam0: {camera_model: pinhole, distortion_model: none, distortion_coeffs: [],\n"
+                 "  intrinsics: [190, 191, 254, 256], resolution: [512, 512]}\n"),
+            Make(CameraModel::kPinhole, {512, 512}, {190, 191, 254, 256}));
+  EXPECT_THAT(Complaint("cam0: {camera_model: omni, intrinsics: [1, 190, 191, 254, 256]}\n"),
+              HasSubstr("cam0.camera_model is 'omni'"));
+  EXPECT_THAT(Complaint("cam0: {camera_model: pinhole, distortion_model: radtan}\n"),
+              HasSubstr("cam0.intrinsics has 0 values"));
+  EXPECT_THAT(Complaint("cam0: {camera_model: pinhole, distortion_model: fov,\n"
+                        "  intrinsics: [190, 191, 254, 256]}\n"),
+              HasSubstr("cam0.distortion_model is 'fov'"));
+  EXPECT_THAT(Complaint("cam0: {camera_model: pinhole, distortion_model: radtan,\n"
+                        "  distortion_coeffs: [0.1, 0.2], intrinsics: [190, 191, 254, 256]}\n"),
+              HasSubstr("cam0.distortion_coeffs has 2 values"));
+}
+
+TEST_F(ReadCameraTest, Kitti) {
+  const std::string p0 =
+      "P0: 7.18856e+02 0.0e+00 6.071928e+02 0.0 0.0 7.18857e+02 1.852157e+02 0.0 0.0 0.0 1.0 0.0\n";
+  EXPECT_EQ(Read(p0 + "P1: 1 2 3\nTr: 1 2\n"),
+            Make(CameraModel::kPinhole, {0, 0}, {718.856, 718.857, 607.1928, 185.2157}));
+  EXPECT_THAT(Complaint("P0: 718.856 0 607 0 0 718\n"), HasSubstr("P0 has 6 values"));
+  EXPECT_THAT(Complaint("P0: 0 0 607 0 0 718 185 0 0 0 1 0\n"), HasSubstr("focal length"));
+  EXPECT_THAT(Complaint("P0: 718 1 607 0 0 718 185 0 0 0 1 0\n"), HasSubstr("P0 is not of the"));
+  EXPECT_THAT(Complaint("P0: nan 0 607 0 0 718 185 0 0 0 1 0\n"), HasSubstr("P0[0] is 'nan'"));
+}
+
+TEST_F(ReadCameraTest, Euroc) {
+  const std::string sensor =
+      "sensor_type: camera\ncomment: VI-Sensor cam0 (MT9M034)\n"
+      "T_BS:\n  cols: 4\n  rows: 4\n  data: [1.0, 0.0]\nrate_hz: 20\n"
+      "resolution: [752, 480]\ncamera_model: pinhole\n"
+      "intrinsics: [458.654, 457.296, 367.215, 248.375] #fu, fv, cu, cv\n";
+  const std::array<double, 4> intrinsics = {458.654, 457.296, 367.215, 248.375};
+  EXPECT_EQ(
+      Read(sensor + "distortion_model: radial-tangential\n"
+                    "distortion_coefficients: [-0.283, 0.074, 0.000194, 1.76e-05]\n"),
+      Make(CameraModel::kRadtan, {752, 480}, intrinsics, {-0.283, 0.074, 0.000194, 1.76e-05}));
+  EXPECT_EQ(Read(sensor + "distortion_model: equidistant\n"
+                          "distortion_coefficients: [0.1, 0.2, 0.3, 0.4]\n"),
+            Make(CameraModel::kEquidistant, {752, 480}, intrinsics, {0.1, 0.2, 0.3, 0.4}));
+}
+
+TEST_F(ReadCameraTest, Colmap) {
+  const std::string header = "# Camera list with one line of data per camera:\n\n";
+  EXPECT_EQ(Read(header + "1 SIMPLE_PINHOLE 640 480 500 320 240\n"),
+            Make(CameraModel::kPinhole, {640, 480}, {500, 500, 319.5, 239.5}));
+  EXPECT_EQ(Read(header + "7 PINHOLE 640 480 500 501 320 240\n"),
+            Make(CameraModel::kPinhole, {640, 480}, {500, 501, 319.5, 239.5}));
+  EXPECT_EQ(Read(header + "1 SIMPLE_RADIAL 640 480 500 320 240 0.1\n"),
+            Make(CameraModel::kRadtan, {640, 480}, {500, 500, 319.5, 239.5}, {0.1}));
+  EXPECT_EQ(Read(header + "1 RADIAL 640 480 500 320 240 0.1 -0.2\n"),
+            Make(CameraModel::kRadtan, {640, 480}, {500, 500, 319.5, 239.5}, {0.1, -0.2}));
+  EXPECT_EQ(Read(header + "1 OPENCV 640 480 500 501 320 240 0.1 0.2 0.3 0.4\n"),
+            Make(CameraModel::kRadtan, {640, 480}, {500, 501, 319.5, 239.5}, {0.1, 0.2, 0.3, 0.4}));
+  EXPECT_EQ(
+      Read(header + "1 OPENCV_FISHEYE 640 480 500 501 320 240 0.1 0.2 0.3 0.4\n"),
+      Make(CameraModel::kEquidistant, {640, 480}, {500, 501, 319.5, 239.5}, {0.1, 0.2, 0.3, 0.4}));
+  EXPECT_EQ(
+      Read(header + "1 FULL_OPENCV 640 480 500 501 320 240 0.1 0.2 0.3 0.4 0.5 0 0 0\n"),
+      Make(CameraModel::kRadtan, {640, 480}, {500, 501, 319.5, 239.5}, {0.1, 0.2, 0.3, 0.4, 0.5}));
+  EXPECT_THAT(
+      Complaint(header + "1 FULL_OPENCV 640 480 500 501 320 240 0.1 0.2 0.3 0.4 0.5 0 0.6 0\n"),
+      HasSubstr("camera 1: k5 is 0.6"));
+  EXPECT_THAT(Complaint("1 FOV 640 480 500 501 320 240 0.1\n"), HasSubstr("model is 'FOV'"));
+  EXPECT_THAT(Complaint("1 PINHOLE 640 480 500 320 240\n"), HasSubstr("3 parameters"));
+  EXPECT_THAT(Complaint("1 PINHOLE 640 480 500 0 320 240\n"), HasSubstr("camera 1: fy is '0'"));
+  EXPECT_EQ(Read("1 SIMPLE_PINHOLE 640 480 500 320 240\n2 PINHOLE 640 480 500 500 320 240\n").fx,
+            500.0);
+  EXPECT_THAT(
+      Complaint("1 SIMPLE_PINHOLE 640 480 500 320 240\n2 SIMPLE_PINHOLE 640 480 9 320 240\n"),
+      HasSubstr("cameras 1 and 2 differ"));
+}
+
+TEST_F(ReadCameraTest, ComplaintsNameFileAndKey) {
+  const std::string end = "fy: 500\ncx: 320\ncy: 240\n";
+  EXPECT_THAT(Complaint("model: pinhole\n" + end), HasSubstr("fx is missing"));
+  EXPECT_THAT(Complaint("model: pinhole\nfx: 0\n" + end), HasSubstr("fx is '0'"));
+  EXPECT_THAT(Complaint("model: pinhole\nfx: -5\n" + end), HasSubstr("fx is '-5'"));
+  EXPECT_THAT(Complaint("model: pinhole\nfx: .nan\n" + end), HasSubstr("fx is '.nan'"));
+  EXPECT_THAT(Complaint("model: pinhole\nfx: [5]\n" + end), HasSubstr("fx must be a single"));
+  EXPECT_THAT(Complaint("model: pinhole\nfx: 5 px\n" + end), HasSubstr("fx is '5 px'"));
+  EXPECT_THAT(Complaint("fx: 5\n" + end), HasSubstr("model is missing"));
+  EXPECT_THAT(Complaint("model: fov\nfx: 5\n" + end), HasSubstr("model is 'fov'"));
+  EXPECT_THAT(Complaint("model: radtan\nfx: 5\n" + end), HasSubstr("distortion is missing"));
+  EXPECT_THAT(Complaint("model: pinhole\nfx: 5\ndistortion: [1, 2, 3, 4]\n" + end),
+              HasSubstr("distortion has 4 values, pinhole takes none"));
+  EXPECT_THAT(Complaint("model: equidistant\nfx: 5\ndistortion: [1, x, 3, 4]\n" + end),
+              HasSubstr("distortion[1] is 'x'"));
+  EXPECT_THAT(Complaint("model: pinhole\nfx: 5\nfocal: 5\n" + end), HasSubstr("focal is no key"));
+  EXPECT_THAT(Complaint("model: pinhole\nfx: 5\nwidth: 640\n" + end), HasSubstr("640x0"));
+  EXPECT_THAT(Complaint("model: pinhole\nfx: 5\nwidth: 640.5\n" + end), HasSubstr("width is"));
+  EXPECT_THAT(Complaint("model: pinhole\n  fx: : 5\n"), HasSubstr("line "));
+  EXPECT_THAT(Complaint(""), HasSubstr("is empty"));
+  EXPECT_THAT(Complaint("# nothing\n"), HasSubstr("is empty"));
+  EXPECT_THAT(Complaint("hello world\n"), HasSubstr("no camera found"));
+  EXPECT_THAT(Complaint("P2: 1 2 3\n"), HasSubstr("no camera found"));
+  EXPECT_THAT(Complaint(std::string("\x89PNG\r\n\0\0", 8)), HasSubstr("not a text file"));
+  EXPECT_THROW(ReadCamera(folder_ / "missing.yaml"), std::runtime_error);
+  fs::remove(folder_ / "some.txt");
+  EXPECT_THROW(ReadCamera(folder_), std::runtime_error);
+}
+
+TEST_F(ReadCameraTest, TakesNumbersAsOpenCvAndWindowsWriteThem) {
+  EXPECT_EQ(Read("%YAML:1.0\r\nCamera.fx: 525.\r\nCamera.fy: +5.25e+02\r\nCamera.cx: 320.\r\n"
+                 "Camera.cy: 240.\r\n"),
+            Make(CameraModel::kPinhole, {0, 0}, {525, 525, 320, 240}));
+}
+
+TEST_F(ReadCameraTest, WritingComplainsToo) {
+  const Camera camera = Make(CameraModel::kPinhole, {0, 0}, {500, 500, 320, 240});
+  EXPECT_THROW(WriteCameraYaml(folder_ / "no" / "camera.yaml", camera), std::runtime_error);
+  EXPECT_THROW(WriteCameraYaml(folder_ / "camera.yaml", Camera()), std::invalid_argument);
+}
+
+TEST(CameraFiles, InConfigCanBeRead) {
+  const fs::path folder = fs::path(ROTSLAM_SOURCE_DIR) / "config" / "cameras";
+  int count = 0;
+  for (const auto& entry : fs::directory_iterator(folder)) {
+    EXPECT_NO_THROW(ReadCamera(entry.path()));
+    ++count;
+  }
+  EXPECT_GE(count, 3);
+}
+
+}  // namespace
+}  // namespace rotslam

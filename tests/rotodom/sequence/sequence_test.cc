@@ -1,0 +1,294 @@
+#include "rotodom/sequence/sequence.h"
+
+#include <fstream>
+#include <limits>
+#include <stdexcept>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+#include <opencv2/videoio.hpp>
+
+#include "tests/rotodom/sequence/scratch_folder.h"
+
+namespace rotslam {
+namespace {
+
+using testing::ElementsAre;
+using testing::HasSubstr;
+
+std::vector<Frame> ReadAll(Sequence& sequence) {
+  std::vector<Frame> frames;
+  while (std::optional<Frame> frame = sequence.Next()) frames.push_back(std::move(*frame));
+  return frames;
+}
+
+std::vector<std::string> Names(const std::vector<Frame>& frames) {
+  std::vector<std::string> names;
+  for (const Frame& frame : frames) names.push_back(frame.name);
+  return names;
+}
+
+class SequenceTest : public ScratchFolderTest {
+ protected:
+  std::string Complaint(const std::filesystem::path& path,
+                        const SequenceOptions& options = {}) const {
+    try {
+      OpenSequence(path, options);
+      return "no complaint";
+    } catch (const std::runtime_error& error) {
+      EXPECT_THAT(error.what(), testing::Not(HasSubstr("\n")));
+      return error.what();
+    }
+  }
+
+  // Ten images named by their number, each of a grey ten times its number.
+  void WriteTen() const {
+    for (int k = 0; k < 10; ++k) {
+      WriteImage(std::to_string(k) + ".png", cv::Scalar::all(10 * k));
+    }
+  }
+
+  // False where OpenCV has no encoder. Frame k is of a grey of 20 k.
+  bool WriteVideo(const std::string& name, int num_frames, double fps) const {
+    cv::VideoWriter writer;
+    if (!writer.open((folder_ / name).string(),
+                     cv::CAP_ANY,
+                     cv::VideoWriter::fourcc('M', 'J', 'P', 'G'),
+                     fps,
+                     {64, 48})) {
+      return false;
+    }
+    for (int k = 0; k < num_frames; ++k) {
+      writer.write(cv::Mat(48, 64, CV_8UC3, cv::Scalar::all(20.0 * k)));
+    }
+    return true;
+  }
+};
+
+TEST_F(SequenceTest, GivesEachFrameOnceInOrder) {
+  WriteTen();
+  const auto sequence = OpenSequence(folder_, {});
+  EXPECT_EQ(sequence->NumFrames(), 10);
+  EXPECT_EQ(sequence->image_size(), cv::Size(16, 12));
+  EXPECT_THAT(sequence->Describe(), HasSubstr("image folder, 10 frames, 16x12, 0.3 s, "));
+  const std::vector<Frame> frames = ReadAll(*sequence);
+  ASSERT_EQ(frames.size(), 10u);
+  for (int k = 0; k < 10; ++k) {
+    EXPECT_EQ(frames[k].id, FrameId{k});
+    EXPECT_EQ(frames[k].name, std::to_string(k) + ".png");
+    EXPECT_DOUBLE_EQ(frames[k].timestamp_s, k / 30.0);
+    EXPECT_EQ(frames[k].timestamp_s, sequence->timestamps_s()[k]);
+    EXPECT_EQ(frames[k].problem, "");
+    EXPECT_EQ(frames[k].image.type(), CV_8UC1);
+    EXPECT_EQ(frames[k].image.at<unsigned char>(3, 4), 10 * k);
+  }
+  EXPECT_FALSE(sequence->Next());
+}
+
+TEST_F(SequenceTest, MayBeLeftInTheMiddle) {
+  WriteTen();
+  const auto sequence = OpenSequence(folder_, {});
+  const std::optional<Frame> kept = sequence->Next();
+  ASSERT_TRUE(sequence->Next());
+  EXPECT_EQ(kept->image.at<unsigned char>(3, 4), 0);  // its pixels are its own
+}
+
+TEST_F(SequenceTest, TakesFirstLastAndStride) {
+  WriteTen();
+  SequenceOptions options;
+  options.first = 2;
+  options.last = 8;
+  options.stride = 3;
+  options.fps = 10.0;
+  auto sequence = OpenSequence(folder_, options);
+  EXPECT_EQ(sequence->NumFrames(), 3);
+  EXPECT_THAT(sequence->timestamps_s(), ElementsAre(0.2, 0.5, 0.8));
+  const std::vector<Frame> frames = ReadAll(*sequence);
+  EXPECT_THAT(Names(frames), ElementsAre("2.png", "5.png", "8.png"));
+  EXPECT_EQ(frames[2].id, FrameId{2});
+
+  options = {};
+  options.first = 8;
+  options.last = 1000;  // beyond the end
+  sequence = OpenSequence(folder_, options);
+  EXPECT_THAT(Names(ReadAll(*sequence)), ElementsAre("8.png", "9.png"));
+
+  options.last = std::numeric_limits<int>::max();
+  options.stride = std::numeric_limits<int>::max();
+  EXPECT_EQ(OpenSequence(folder_, options)->NumFrames(), 1);
+
+  options.first = 10;
+  EXPECT_THAT(Complaint(folder_, options),
+              HasSubstr("first frame 10 asked for, but there are only 10"));
+}
+
+TEST_F(SequenceTest, GoesOnBehindAnUnreadableImage) {
+  WriteTen();
+  WriteText("0.png", "");
+  WriteText("4.png", "no picture");
+  WriteImage("6.png", cv::Scalar::all(0), CV_8UC1, {12, 16});
+  const auto sequence = OpenSequence(folder_, {});
+  EXPECT_EQ(sequence->image_size(), cv::Size(16, 12));
+  const std::vector<Frame> frames = ReadAll(*sequence);
+  ASSERT_EQ(frames.size(), 10u);
+  EXPECT_EQ(frames[0].problem, "file is empty");
+  EXPECT_EQ(frames[4].problem, "image cannot be decoded");
+  EXPECT_EQ(frames[6].problem, "image is 12x16, the first readable one is 16x12");
+  for (const Frame& frame : frames) EXPECT_EQ(frame.image.empty(), !frame.problem.empty());
+}
+
+TEST_F(SequenceTest, NoticesCutOffFiles) {
+  cv::Mat noise(120, 160, CV_8UC3);
+  cv::theRNG().state = 7;
+  cv::randu(noise, 0, 255);
+  for (const std::string extension : {".jpg", ".png"}) {
+    std::vector<unsigned char> bytes;
+    ASSERT_TRUE(cv::imencode(extension, noise, bytes));
+    const std::filesystem::path folder = folder_ / extension.substr(1);
+    std::filesystem::create_directories(folder);
+    for (const std::size_t size : {bytes.size(), bytes.size() / 2, bytes.size() / 50}) {
+      std::ofstream(folder / (std::to_string(bytes.size() - size) + extension), std::ios::binary)
+          .write(reinterpret_cast<const char*>(bytes.data()), static_cast<std::streamsize>(size));
+    }
+    const auto sequence = OpenSequence(folder, {});
+    const std::vector<Frame> frames = ReadAll(*sequence);
+    ASSERT_EQ(frames.size(), 3u);
+    EXPECT_EQ(frames[0].problem, "");
+    EXPECT_NE(frames[1].problem, "") << extension;
+    EXPECT_NE(frames[2].problem, "") << extension;
+  }
+}
+
+TEST_F(SequenceTest, MissingFilesOfAListAreUnreadableFrames) {
+  WriteText("rgb.txt", "1.0 a.png\n2.0 b.png\n3.0 c.png\n");
+  EXPECT_THAT(Complaint(folder_), HasSubstr("none of the 3 images can be read; a.png"));
+  WriteImage("b.png");
+  const auto sequence = OpenSequence(folder_, {});
+  const std::vector<Frame> frames = ReadAll(*sequence);
+  ASSERT_EQ(frames.size(), 3u);
+  EXPECT_EQ(frames[0].problem, "file cannot be opened");
+  EXPECT_FALSE(frames[1].image.empty());
+  EXPECT_EQ(frames[2].timestamp_s, 3.0);
+}
+
+TEST_F(SequenceTest, BringsEveryPixelFormatToEightBits) {
+  WriteImage("0.png", cv::Scalar(10, 20, 30), CV_8UC3);
+  WriteImage("1.png", cv::Scalar(10, 20, 30, 128), CV_8UC4);
+  WriteImage("2.png", cv::Scalar(257.0 * 10, 257.0 * 20, 257.0 * 30), CV_16UC3);
+  WriteImage("3.png", cv::Scalar(257.0 * 10), CV_16UC1);
+  WriteImage("4.png", cv::Scalar(257.0 * 10, 257.0 * 20, 257.0 * 30, 65535.0), CV_16UC4);
+  WriteImage("5.tiff", cv::Scalar(0.5), CV_32FC1);
+  const auto sequence = OpenSequence(folder_, {});
+  const std::vector<Frame> frames = ReadAll(*sequence);
+  ASSERT_EQ(frames.size(), 6u);
+  for (const int k : {0, 1, 2, 4}) {
+    ASSERT_EQ(frames[k].image.type(), CV_8UC3) << k << ": " << frames[k].problem;
+    EXPECT_EQ(frames[k].image.at<cv::Vec3b>(3, 4), cv::Vec3b(10, 20, 30)) << k;
+  }
+  ASSERT_EQ(frames[3].image.type(), CV_8UC1);
+  EXPECT_EQ(frames[3].image.at<unsigned char>(3, 4), 10);
+  EXPECT_THAT(frames[5].problem, HasSubstr("neither 8 nor 16 bits"));
+}
+
+TEST_F(SequenceTest, RefusesTimestampsThatDoNotIncrease) {
+  for (const char* name : {"a.png", "b.png", "c.png"}) WriteImage(name);
+  WriteText("rgb.txt", "1.0 a.png\n2.5 b.png\n2.5 c.png\n");
+  EXPECT_THAT(
+      Complaint(folder_),
+      testing::AllOf(HasSubstr("c.png: timestamp 2.500000000 s is not later"), HasSubstr("b.png")));
+  WriteText("rgb.txt", "1.0 a.png\n0.5 b.png\n");
+  EXPECT_THAT(Complaint(folder_), HasSubstr("b.png: timestamp 0.5"));
+  SequenceOptions options;
+  options.first = 1;  // the way round it
+  EXPECT_EQ(OpenSequence(folder_, options)->NumFrames(), 1);
+}
+
+TEST_F(SequenceTest, RefusesOptionsOutOfRange) {
+  WriteTen();
+  const auto problem = [](int first, int last, int stride, double fps) {
+    SequenceOptions options;
+    options.first = first;
+    options.last = last;
+    options.stride = stride;
+    options.fps = fps;
+    return options.Problem().value_or("");
+  };
+  EXPECT_EQ(problem(0, -1, 1, 30.0), "");
+  EXPECT_EQ(problem(3, 3, 1, 30.0), "");
+  EXPECT_THAT(problem(-1, -1, 1, 30.0), HasSubstr("first is -1"));
+  EXPECT_THAT(problem(0, -2, 1, 30.0), HasSubstr("last is -2"));
+  EXPECT_THAT(problem(3, 2, 1, 30.0), HasSubstr("last is 2"));
+  EXPECT_THAT(problem(0, -1, 0, 30.0), HasSubstr("stride is 0"));
+  EXPECT_THAT(problem(0, -1, 1, 0.0), HasSubstr("fps is 0"));
+  SequenceOptions options;
+  options.stride = 0;
+  EXPECT_THROW(OpenSequence(folder_, options), std::invalid_argument);
+}
+
+TEST_F(SequenceTest, Video) {
+  if (!WriteVideo("film.avi", 12, 25.0)) GTEST_SKIP() << "OpenCV has no MJPG encoder here";
+  WriteText("camera.yaml", "x");
+  auto sequence = OpenSequence(folder_ / "film.avi", {});
+  EXPECT_EQ(sequence->kind(), SequenceKind::kVideo);
+  EXPECT_EQ(sequence->image_size(), cv::Size(64, 48));
+  EXPECT_EQ(sequence->NumFrames(), 12);
+  EXPECT_EQ(sequence->CameraFile(), folder_ / "camera.yaml");
+  std::vector<Frame> frames = ReadAll(*sequence);
+  ASSERT_EQ(frames.size(), 12u);
+  EXPECT_EQ(sequence->NumFrames(), 12);
+  EXPECT_EQ(sequence->timestamps_s().size(), 12u);
+  for (int k = 0; k < 12; ++k) {
+    EXPECT_EQ(frames[k].id, FrameId{k});
+    EXPECT_NEAR(frames[k].timestamp_s, k / 25.0, 1e-6);
+    ASSERT_EQ(frames[k].image.type(), CV_8UC3);
+    EXPECT_NEAR(cv::mean(frames[k].image)[0], 20.0 * k, 4.0) << k;
+  }
+
+  SequenceOptions options;
+  options.first = 3;
+  options.last = 9;
+  options.stride = 4;
+  sequence = OpenSequence(folder_ / "film.avi", options);
+  EXPECT_EQ(sequence->NumFrames(), 2);
+  frames = ReadAll(*sequence);
+  EXPECT_THAT(Names(frames), ElementsAre("000003", "000007"));
+  EXPECT_NEAR(frames[1].timestamp_s, 7.0 / 25.0, 1e-6);
+  EXPECT_NEAR(cv::mean(frames[1].image)[0], 140.0, 4.0);
+  EXPECT_EQ(sequence->NumFrames(), 2);
+  EXPECT_FALSE(sequence->Next());
+
+  options.last = std::numeric_limits<int>::max();
+  options.stride = std::numeric_limits<int>::max();
+  sequence = OpenSequence(folder_ / "film.avi", options);
+  EXPECT_EQ(sequence->NumFrames(), 1);
+  EXPECT_EQ(ReadAll(*sequence).size(), 1u);
+
+  options = {};
+  options.first = 12;
+  EXPECT_THAT(Complaint(folder_ / "film.avi", options), HasSubstr("there are only 12"));
+}
+
+TEST_F(SequenceTest, RefusesFilesThatAreNoVideo) {
+  EXPECT_THAT(Complaint(WriteText("film.mp4", "no film")), HasSubstr("not a video"));
+}
+
+TEST(MatchToImages, FillsInOrRefuses) {
+  Camera camera;
+  camera.fx = camera.fy = 500.0;
+  EXPECT_EQ(MatchToImages(camera, {752, 480}).width, 752);
+  camera.width = 640;
+  camera.height = 480;
+  EXPECT_EQ(MatchToImages(camera, {640, 480}), camera);
+  try {
+    MatchToImages(camera, {752, 480});
+    FAIL() << "no exception";
+  } catch (const std::runtime_error& error) {
+    EXPECT_THAT(error.what(), HasSubstr("camera says 640x480, images are 752x480: "));
+  }
+}
+
+}  // namespace
+}  // namespace rotslam
