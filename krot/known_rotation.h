@@ -131,8 +131,10 @@ struct KrotSolution {
 /// @return  see KrotSolution. Throws std::invalid_argument when an option is out of range, a track
 ///          names a view without rotation, or the camera has no focal length.
 /// Error:   truth to 1e-6 (relative to the scene) on clean scenes (KnownRotation tests).
-/// Cost:    linear programs over observations_per_view observations of each view, about 3 s for 100
-///          views with bracket; everything else is linear in the observations.
+/// Cost:    linear programs over observations_per_view observations of each view; everything else
+///          is linear in the observations. On a street with 0.7 px noise, one thread: 100 views,
+///          10k tracks, 64k observations 2.5 to 3.5 s of which the bracket 2 s; 200 views, 40k
+///          tracks, 258k observations 4.3 s without bracket.
 /// Source:  Kahl & Hartley, Multiple-View Geometry under the L-infinity Norm, PAMI 2008, for the
 ///          bracket; Dalalyan & Keriven, L1-penalized robust estimation for a class of inverse
 ///          problems arising in multiview geometry, NIPS 2009, for the L1 start; resection as in

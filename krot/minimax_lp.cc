@@ -196,8 +196,7 @@ bool RepairStep(const MinimaxProblem& problem,
       const Eigen::Vector3d difference = lambda_point - lambda_center(problem.observations[o].view);
       for (int k = 0; k < 5; ++k) {
         double& multiplier = y[5 * o + k];
-        multiplier =
-            std::max(0.0, multiplier - multiplier * normals[o][k].dot(difference));
+        multiplier = std::max(0.0, multiplier - multiplier * normals[o][k].dot(difference));
       }
     }
   }

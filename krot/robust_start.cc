@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <stdexcept>
+#include <utility>
 
 namespace rotslam {
 namespace {
@@ -18,6 +19,35 @@ double NextWeight(const MinimaxProblem& problem,
       structure.point_in_world[observation.point] - structure.center_in_world[observation.view]);
   const double excess = std::max(0.0, residual - gamma) / gamma;
   return std::max(kFloor, 1.0 / ((1.0 + excess * excess) * std::max(1.0, depth)));
+}
+
+std::vector<double> NextWeights(const MinimaxProblem& problem,
+                                const RobustStart& start,
+                                double gamma) {
+  std::vector<double> weights;
+  for (std::size_t o = 0; o < problem.observations.size(); ++o) {
+    weights.push_back(
+        NextWeight(problem, start.structure, problem.observations[o], start.residuals[o], gamma));
+  }
+  return weights;
+}
+
+// One program; false leaves the answer of the one before.
+bool SolveRound(const MinimaxProblem& problem,
+                double gamma,
+                const std::vector<double>& weights,
+                const RobustStartOptions& options,
+                RobustStart& start) {
+  MinimaxLpResult lp = SolveL1Slack(problem, gamma, options.depth_price, weights, options.lp);
+  ++start.num_programs;
+  if (lp.call != LpCallStatus::kCompleted) return false;
+  start.call = lp.call;
+  start.structure = std::move(lp.structure);
+  start.residuals.clear();
+  for (const ImageObservation& observation : problem.observations) {
+    start.residuals.push_back(BoxResidual(problem, start.structure, observation));
+  }
+  return true;
 }
 
 }  // namespace
@@ -39,23 +69,13 @@ RobustStart SolveRobustStart(const MinimaxProblem& problem,
   if (!(gamma > 0.0)) throw std::invalid_argument("robust start: gamma must be above 0");
   RobustStart start;
   std::vector<double> weights;
-  while (start.num_programs < options.max_rounds) {
-    MinimaxLpResult lp = SolveL1Slack(problem, gamma, options.depth_price, weights, options.lp);
-    ++start.num_programs;
-    if (lp.call != LpCallStatus::kCompleted) return start;  // the round before still stands
-    start.call = lp.call;
-    start.structure = std::move(lp.structure);
-    start.residuals.clear();
-    weights.clear();
-    double largest = 0.0;
-    for (const ImageObservation& observation : problem.observations) {
-      const double residual = BoxResidual(problem, start.structure, observation);
-      start.residuals.push_back(residual);
-      weights.push_back(NextWeight(problem, start.structure, observation, residual, gamma));
-      largest = std::max(largest, residual);
-    }
-    if (largest <= 1.01 * gamma) return start;  // nobody pays: no price matters
+  for (bool done = false; !done && start.num_programs < options.max_rounds;) {
+    if (!SolveRound(problem, gamma, weights, options, start)) return start;
+    weights = NextWeights(problem, start, gamma);
+    // Where nobody pays, no price matters.
+    done = *std::max_element(start.residuals.begin(), start.residuals.end()) <= 1.01 * gamma;
   }
+  if (options.use_sharpening) SolveRound(problem, 0.0, weights, options, start);
   return start;
 }
 

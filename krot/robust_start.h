@@ -17,6 +17,10 @@ struct RobustStartOptions {
   // Price of missing the smallest depth by one, over that of missing a pixel bound by one at depth
   // one. Large enough that structures do not collapse to buy off outliers.
   double depth_price = 10.0;
+  // A last program with the bound zero, outliers still priced down: plain L1, which picks the
+  // likeliest structure from inside the tube that the rounds leave open. Takes the centres' error
+  // over a street of 60 m from 0.3..1.3 m to 0.05..0.4 m (0 to 0.3 deg of rotation error, 0.7 px).
+  bool use_sharpening = true;
   LpOptions lp;
 
   std::optional<std::string> Problem() const;
@@ -25,6 +29,7 @@ struct RobustStartOptions {
   void Visit(Visitor&& visit) {
     visit("max_rounds", max_rounds);
     visit("depth_price", depth_price);
+    visit("use_sharpening", use_sharpening);
   }
 };
 
@@ -38,7 +43,9 @@ struct RobustStart {
 /// Structure that misses the bound `gamma` by the least sum, outliers priced down in rounds by
 /// 1 / ((1 + (excess / gamma)^2) depth).
 /// Source:  Candes, Wakin & Boyd, Enhancing sparsity by reweighted l1 minimization, 2008; ours
-///          squares the excess and divides by depth, since slack is counted at depth.
+///          squares the excess and divides by depth, since slack is counted at depth, and ends
+///          with one program without the bound.
+/// Error:   truth to 1e-6 of the scene's size on clean scenes.
 RobustStart SolveRobustStart(const MinimaxProblem& problem,
                              double gamma,
                              const RobustStartOptions& options = {});

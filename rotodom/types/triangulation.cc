@@ -36,15 +36,26 @@ double BearingError(const Sighting& sighting, const Eigen::Vector3d& point_in_wo
 
 double TriangulationAngle(const std::vector<Sighting>& sightings,
                           const Eigen::Vector3d& point_in_world) {
-  double largest = 0.0;
-  for (std::size_t a = 0; a < sightings.size(); ++a) {
-    for (std::size_t b = a + 1; b < sightings.size(); ++b) {
-      largest = std::max(largest,
-                         AngleBetween(point_in_world - sightings[a].center_in_world,
-                                      point_in_world - sightings[b].center_in_world));
+  std::vector<Eigen::Vector3d> rays;
+  rays.reserve(sightings.size());
+  for (const Sighting& sighting : sightings) {
+    rays.push_back((point_in_world - sighting.center_in_world).stableNormalized());
+  }
+  // The widest pair by its chord, which grows with the angle and is exact for small ones; long
+  // tracks have thousands of pairs, so only that one pays for an arc tangent.
+  double largest_chord_squared = 0.0;
+  std::size_t best_a = 0;
+  std::size_t best_b = 0;
+  for (std::size_t a = 0; a < rays.size(); ++a) {
+    for (std::size_t b = a + 1; b < rays.size(); ++b) {
+      const double chord_squared = (rays[a] - rays[b]).squaredNorm();
+      if (chord_squared <= largest_chord_squared) continue;
+      largest_chord_squared = chord_squared;
+      best_a = a;
+      best_b = b;
     }
   }
-  return largest;
+  return rays.empty() ? 0.0 : AngleBetween(rays[best_a], rays[best_b]);
 }
 
 std::optional<Eigen::Vector3d> Triangulate(const std::vector<Sighting>& sightings,

@@ -1,0 +1,251 @@
+#include "krot/known_rotation.h"
+
+#include <algorithm>
+#include <limits>
+#include <stdexcept>
+
+#include <gtest/gtest.h>
+
+#include "tests/scenes/alignment.h"
+#include "tests/scenes/scene.h"
+
+namespace rotslam {
+namespace {
+
+SceneOptions Street(int num_views, int num_points) {
+  SceneOptions options;
+  options.path = ScenePath::kStreet;
+  options.num_views = num_views;
+  options.num_points = num_points;
+  return options;
+}
+
+KrotSolution Solve(const Scene& scene, const KrotOptions& options = {}) {
+  return SolveKnownRotation(scene.cam_from_world, scene.tracks, scene.camera, options);
+}
+
+CenterError ErrorOf(const KrotSolution& solution, const Scene& scene) {
+  return CompareCenters(
+      solution.center_in_world,
+      scene.true_center_in_world,
+      AlignCentersKnownRotation(solution.center_in_world, scene.true_center_in_world));
+}
+
+TEST(SolveKnownRotation, FindsTheTruthOnCleanScenes) {
+  for (const ScenePath path : {ScenePath::kRing, ScenePath::kRandom, ScenePath::kStreet}) {
+    for (const char* start : {"l1", "bisection"}) {
+      SceneOptions scene_options = Street(10, 200);
+      scene_options.path = path;
+      const Scene scene = MakeScene(scene_options);
+      KrotOptions options;
+      options.start = start;
+      const KrotSolution solution = Solve(scene, options);
+      ASSERT_TRUE(solution.Usable()) << solution.message;
+      EXPECT_EQ(solution.center_in_world.size(), 10u);
+      EXPECT_EQ(solution.center_in_world.begin()->second.norm(), 0.0);
+      const Similarity align =
+          AlignCentersKnownRotation(solution.center_in_world, scene.true_center_in_world);
+      EXPECT_LT(ErrorOf(solution, scene).max, 1e-5) << static_cast<int>(path) << start;
+      EXPECT_LT(MaxPointError(solution.point_in_world, scene.true_point_in_world, align), 1e-4);
+      EXPECT_TRUE(solution.removed.empty());
+    }
+  }
+}
+
+TEST(SolveKnownRotation, ClimbsTheLadderOfNoise) {
+  // Street of 30 m; rung: pixel noise, rotation noise, error allowed (twice what seeds 1..5 gave).
+  struct Rung {
+    double noise_px;
+    double rotation_noise_deg;
+    double max_error;
+  };
+  for (const Rung& rung :
+       {Rung{0.1, 0.0, 0.1}, Rung{0.7, 0.03, 0.4}, Rung{0.7, 0.1, 0.6}, Rung{1.0, 0.3, 1.5}}) {
+    SceneOptions scene_options = Street(30, 1500);
+    scene_options.noise_px = rung.noise_px;
+    scene_options.rotation_noise_deg = rung.rotation_noise_deg;
+    const Scene scene = MakeScene(scene_options);
+    const KrotSolution solution = Solve(scene);
+    ASSERT_TRUE(solution.Usable()) << solution.message;
+    EXPECT_EQ(solution.status, KrotStatus::kConverged) << solution.message;
+    EXPECT_GE(solution.gamma_low, 0.99 * solution.gamma_high - 1e-12);
+    EXPECT_EQ(solution.center_in_world.size(), 30u);
+    EXPECT_LT(ErrorOf(solution, scene).max, rung.max_error) << rung.rotation_noise_deg;
+    EXPECT_GT(solution.point_in_world.size(), 0.95 * static_cast<double>(scene.tracks.size()));
+  }
+}
+
+TEST(SolveKnownRotation, TenPercentOutliersAreRemovedAndChangeLittle) {
+  SceneOptions scene_options = Street(30, 1500);
+  scene_options.noise_px = 0.7;
+  scene_options.rotation_noise_deg = 0.03;
+  scene_options.outlier_ratio = 0.1;
+  const Scene scene = MakeScene(scene_options);
+  const KrotSolution solution = Solve(scene);
+  ASSERT_TRUE(solution.Usable()) << solution.message;
+  int caught = 0;
+  for (const RemovedObservation& removed : solution.removed) {
+    caught += scene.outliers.contains({removed.track, removed.frame});
+  }
+  int num_observations = 0;
+  for (const Track& track : scene.tracks) {
+    num_observations += static_cast<int>(track.observations.size());
+  }
+  EXPECT_GT(caught, 0.95 * static_cast<double>(scene.outliers.size()));
+  EXPECT_LT(static_cast<double>(solution.removed.size()) - caught, 0.02 * num_observations);
+  EXPECT_LT(ErrorOf(solution, scene).max, 1.0);
+}
+
+TEST(SolveKnownRotation, GrowsBeyondOneProgram) {
+  SceneOptions scene_options = Street(40, 3000);
+  scene_options.noise_px = 0.5;
+  const Scene scene = MakeScene(scene_options);
+  KrotOptions options;
+  options.max_lp_views = 15;
+  const KrotSolution solution = Solve(scene, options);
+  ASSERT_TRUE(solution.Usable()) << solution.message;
+  EXPECT_EQ(solution.center_in_world.size(), 40u);
+  EXPECT_EQ(solution.num_grown_views, 25);
+  EXPECT_LT(ErrorOf(solution, scene).max, 0.5);
+}
+
+TEST(SolveKnownRotation, RelabellingViewsChangesNothing) {
+  SceneOptions scene_options;
+  scene_options.num_views = 8;
+  scene_options.num_points = 80;
+  const Scene scene = MakeScene(scene_options);
+  const auto relabelled = [](FrameId frame) { return FrameId{1000 - 7 * frame.value}; };
+  Scene other = scene;
+  other.cam_from_world.clear();
+  for (const auto& [frame, rotation] : scene.cam_from_world) {
+    other.cam_from_world[relabelled(frame)] = rotation;
+  }
+  for (Track& track : other.tracks) {
+    std::reverse(track.observations.begin(), track.observations.end());
+    for (Observation& observation : track.observations) {
+      observation.frame = relabelled(observation.frame);
+    }
+  }
+  CenterMap back;
+  const KrotSolution b = Solve(other);
+  for (const auto& [frame, center] : b.center_in_world) {
+    back[FrameId{(1000 - frame.value) / 7}] = center;
+  }
+  const KrotSolution a = Solve(scene);
+  ASSERT_EQ(a.center_in_world.size(), back.size());
+  const Similarity align = AlignCentersKnownRotation(back, a.center_in_world);
+  EXPECT_LT(CompareCenters(back, a.center_in_world, align).max, 1e-6);
+  // Gauge by median depth: the scale agrees without alignment.
+  EXPECT_NEAR(align.scale, 1.0, 1e-6);
+}
+
+TEST(SolveKnownRotation, RepeatsItsBytesWithAnyNumberOfThreads) {
+  SceneOptions scene_options = Street(20, 800);
+  scene_options.noise_px = 0.7;
+  scene_options.outlier_ratio = 0.05;
+  const Scene scene = MakeScene(scene_options);
+  KrotOptions options;
+  const KrotSolution a = Solve(scene, options);
+  options.num_threads = 3;
+  const KrotSolution b = Solve(scene, options);
+  EXPECT_EQ(a.center_in_world, b.center_in_world);
+  EXPECT_EQ(a.point_in_world, b.point_in_world);
+  EXPECT_EQ(a.gamma_low, b.gamma_low);
+  EXPECT_EQ(a.gamma_high, b.gamma_high);
+}
+
+TEST(SolveKnownRotation, SeparateScenesComeBackAsComponents) {
+  SceneOptions scene_options;
+  scene_options.num_views = 6;
+  scene_options.num_points = 100;
+  Scene scene = MakeScene(scene_options);
+  scene_options.num_views = 8;
+  scene_options.seed = 5;
+  const Scene second = MakeScene(scene_options);
+  for (const auto& [frame, rotation] : second.cam_from_world) {
+    scene.cam_from_world[FrameId{frame.value + 50}] = rotation;
+  }
+  for (Track track : second.tracks) {
+    track.id.value += 5000;
+    for (Observation& observation : track.observations) observation.frame.value += 50;
+    scene.tracks.push_back(std::move(track));
+  }
+  const KrotSolution solution = Solve(scene);
+  ASSERT_TRUE(solution.Usable()) << solution.message;
+  EXPECT_EQ(solution.center_in_world.size(), 14u);
+  EXPECT_EQ(solution.component.at(FrameId{50}), 0);
+  EXPECT_EQ(solution.component.at(FrameId{0}), 1);
+  CenterMap small;
+  for (const auto& [frame, center] : solution.center_in_world) {
+    if (frame < FrameId{50}) small[frame] = center;
+  }
+  const Similarity align = AlignCentersKnownRotation(small, scene.true_center_in_world);
+  EXPECT_LT(CompareCenters(small, scene.true_center_in_world, align).max, 1e-5);
+}
+
+TEST(SolveKnownRotation, PureRotationIsInfeasible) {
+  SceneOptions scene_options;
+  scene_options.path = ScenePath::kPivot;
+  for (const double noise_px : {0.0, 0.7}) {
+    scene_options.noise_px = noise_px;
+    const KrotSolution solution = Solve(MakeScene(scene_options));
+    EXPECT_EQ(solution.status, KrotStatus::kInfeasible);
+    EXPECT_FALSE(solution.Usable());
+    EXPECT_NE(solution.message.find("no parallax"), std::string::npos) << solution.message;
+  }
+}
+
+TEST(SolveKnownRotation, DegenerateInputsGetAStatus) {
+  const Scene scene = MakeScene({});
+  EXPECT_EQ(SolveKnownRotation({}, {}, scene.camera, {}).status, KrotStatus::kInfeasible);
+  EXPECT_EQ(SolveKnownRotation(scene.cam_from_world, {}, scene.camera, {}).status,
+            KrotStatus::kInfeasible);
+  Scene single = scene;
+  for (Track& track : single.tracks) track.observations.resize(1);
+  EXPECT_EQ(Solve(single).status, KrotStatus::kInfeasible);
+  Scene empty_tracks = scene;
+  for (Track& track : empty_tracks.tracks) track.observations.clear();
+  EXPECT_EQ(Solve(empty_tracks).status, KrotStatus::kInfeasible);
+  Scene one_view = scene;
+  for (Track& track : one_view.tracks) {
+    std::erase_if(track.observations,
+                  [](const Observation& observation) { return observation.frame.value != 0; });
+  }
+  EXPECT_EQ(Solve(one_view).status, KrotStatus::kInfeasible);
+}
+
+TEST(SolveKnownRotation, BadObservationsAreRemovedWithTheirReason) {
+  SceneOptions scene_options;
+  scene_options.num_views = 6;
+  scene_options.num_points = 60;
+  Scene scene = MakeScene(scene_options);
+  scene.tracks[3].observations[1].bearing.x() = std::numeric_limits<double>::quiet_NaN();
+  scene.tracks[4].observations.push_back(scene.tracks[4].observations.front());
+  // Behind the image plane: stays out of the linear programs and disagrees with its point.
+  scene.tracks[5].observations[2].bearing = -scene.tracks[5].observations[2].bearing;
+  const KrotSolution solution = Solve(scene);
+  ASSERT_TRUE(solution.Usable()) << solution.message;
+  EXPECT_LT(ErrorOf(solution, scene).max, 1e-5);
+  ASSERT_EQ(solution.removed.size(), 3u);
+  EXPECT_EQ(solution.removed[0].reason, RemovalReason::kNotFinite);
+  EXPECT_EQ(solution.removed[1].reason, RemovalReason::kDuplicate);
+  EXPECT_EQ(solution.removed[2].track, scene.tracks[5].id);
+}
+
+TEST(SolveKnownRotation, BrokenContractsThrow) {
+  Scene scene = MakeScene({});
+  KrotOptions options;
+  options.threshold_px = 0.0;
+  EXPECT_THROW(Solve(scene, options), std::invalid_argument);
+  options = {};
+  options.start = "l2";
+  EXPECT_THROW(Solve(scene, options), std::invalid_argument);
+  scene.camera.fx = scene.camera.fy = 0.0;
+  EXPECT_THROW(Solve(scene), std::invalid_argument);
+  scene = MakeScene({});
+  scene.cam_from_world.erase(FrameId{2});
+  EXPECT_THROW(Solve(scene), std::invalid_argument);
+}
+
+}  // namespace
+}  // namespace rotslam
