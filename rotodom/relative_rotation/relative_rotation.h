@@ -19,8 +19,9 @@ struct RelativeRotationOptions {
   double loss_sigmas = 3.0;
   // No match is believed to be better than this, however well the matches agree.
   double min_noise_px = 0.02;
-  // Part of a match's error that its neighbours share, so that the scatter does not show it: patches
-  // deform as the view turns. A baseline must show more flow than this to count as evidence.
+  // Part of a match's error that its neighbours share, so that the scatter does not show it:
+  // patches deform as the view turns. A baseline must show more flow than this to count as
+  // evidence.
   double shared_error_px = 0.1;
   // Matches per sample of the normal epipolar solver: fewer fail at small baselines, more meet an
   // outlier. Every other sample is a small one.
