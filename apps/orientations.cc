@@ -50,10 +50,7 @@ Orientations FindOrientations(Input& input,
     orientations.num_weak += report.weak;
     progress.Step(frame->id.value + 1, std::to_string(report.num_inliers) + " inliers");
   }
-  orientations.cam_from_world = odometry.cam_from_world();
-  orientations.graph = odometry.graph();
-  orientations.edge_matches = odometry.edge_matches();
-  orientations.features = odometry.features();
+  static_cast<OdometryResult&>(orientations) = std::move(odometry).TakeResult();
 
   const int num_frames = static_cast<int>(orientations.timestamps_s.size());
   if (num_frames < 3) {

@@ -10,12 +10,8 @@
 namespace rotslam {
 
 /// What the first stage knows once the sequence has been read.
-struct Orientations {
+struct Orientations : OdometryResult {
   std::vector<double> timestamps_s;  // by frame id
-  RotationMap cam_from_world;        // of every frame
-  ViewGraph graph;
-  std::vector<EdgeMatches> edge_matches;
-  std::map<FrameId, Features> features;
   int num_unreadable = 0;
   int num_predicted = 0;  // frames without an edge; their orientations are interpolated
   int num_weak = 0;

@@ -740,6 +740,16 @@ BundleResult RefineBundle(const BundleProblem& problem, const BundleOptions& opt
   return result;
 }
 
+Reconstruction TriangulateTracks(const BundleProblem& problem, const BundleOptions& options) {
+  CheckContract(problem, options);
+  State state = MakeState(problem);
+  ClassifyAll(problem.camera, options.fine.max_error_px, /*retriangulate=*/true, options, state);
+  BundleResult result;
+  TakeResult(problem, state, result);
+  result.reconstruction.center_in_world = problem.start.center_in_world;
+  return std::move(result.reconstruction);
+}
+
 Reconstruction WithoutShallowPoints(const Reconstruction& reconstruction, double min_angle_deg) {
   Reconstruction result = reconstruction;
   result.tracks.clear();
