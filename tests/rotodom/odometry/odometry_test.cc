@@ -171,6 +171,22 @@ TEST(RotationalOdometry, GoesOnAfterTheLensWasCovered) {
   EXPECT_EQ(run.odometry.cam_from_world().size(), std::size_t(kNumFrames));
 }
 
+// Disabled because it fails: from the bad prediction that five dark frames leave, the estimator
+// ends in a second minimum of the epipolar cost, 0.4 deg a step off, with as many inliers and
+// residuals of 0.036 px instead of 0.028 px. Enable when EstimateRelativeRotation compares both
+// minima.
+TEST(RotationalOdometry, DISABLED_IsAsExactAfterTheLensWasCovered) {
+  std::vector<cv::Mat> images = Handheld().images;
+  for (int k = 3; k < 8; ++k) images[k] = cv::Mat::zeros(240, 320, CV_8U);
+  const OdometryRun run = RunOn(images);
+  const RotationMap& cam_from_world = run.odometry.cam_from_world();
+  const Rotation estimate =
+      cam_from_world.at(FrameId{11}) * cam_from_world.at(FrameId{8}).Inverse();
+  const Rotation truth =
+      Handheld().truth[11].world_from_cam.Inverse() * Handheld().truth[8].world_from_cam;
+  EXPECT_LT((estimate * truth.Inverse()).AngleDeg(), 0.15);
+}
+
 TEST(RotationalOdometry, RejectsABrokenContract) {
   const Camera camera = Handheld().camera;
   OdometryOptions bad;
