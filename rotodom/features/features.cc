@@ -113,7 +113,7 @@ std::vector<Corner> DetectOnLevel(const cv::Mat& image, int count, const Feature
   return ChooseByTurns(cells, count);
 }
 
-// Features per level, proportional to the level's side length as in ORB.
+// Features per level, proportional to the level's side length as in ORB; they sum to max_features.
 std::vector<int> CountsPerLevel(const FeatureOptions& options) {
   std::vector<double> shares(options.num_levels);
   double sum = 0.0;
@@ -122,8 +122,12 @@ std::vector<int> CountsPerLevel(const FeatureOptions& options) {
     sum += shares[level];
   }
   std::vector<int> counts(options.num_levels);
+  double share = 0.0;  // of this level and those before it
+  int given = 0;
   for (int level = 0; level < options.num_levels; ++level) {
-    counts[level] = static_cast<int>(std::lround(options.max_features * shares[level] / sum));
+    share += shares[level] / sum;
+    counts[level] = static_cast<int>(std::lround(options.max_features * share)) - given;
+    given += counts[level];
   }
   return counts;
 }
