@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <limits>
 #include <random>
 #include <stdexcept>
 
@@ -17,6 +18,9 @@ namespace {
 // meaning.
 constexpr double kEpipoleFloor = 1e-3;
 
+// Minima of the epipolar distance lie this far from one another at the parallax of neighbouring
+// frames.
+constexpr double kStartScatterDeg = 1.0;
 // One more than the five degrees of freedom.
 constexpr int kSmallSample = 6;
 
@@ -168,27 +172,38 @@ RotationFit RefineRotation(const std::vector<BearingPair>& pairs,
   return fit;
 }
 
-// Truncated sum of squared Sampson distances, in units of the threshold; smaller is better.
+// Sum of log(1 + r^2 / s^2) of the Sampson distances r, cut off at the threshold; smaller is
+// better. A match is worth more the nearer it is at every scale above s = `finest`, so that two
+// models which share their inliers are told apart by the matches' own noise, whatever that is.
 double Score(const std::vector<BearingPair>& pairs,
              const EpipolarModel& model,
              double threshold,
+             double finest,
              int* num_inliers) {
   const Eigen::Matrix3d R_j_i = model.j_from_i.Matrix();
+  const double outlier = 1.0 + threshold * threshold / (finest * finest);
+  // Logarithms are slow: take one of a product of many factors, each at most `outlier`.
+  constexpr int kFactors = 16;
   double score = 0.0;
+  double product = 1.0;
   int count = 0;
-  for (const BearingPair& pair : pairs) {
-    const double r = SampsonDistance(pair, R_j_i, model.direction) / threshold;
-    const bool behind = pair.bearing_j.dot(R_j_i * pair.bearing_i) < 0.0;
-    const double cost = behind ? 1.0 : std::min(r * r, 1.0);
-    score += cost;
-    count += cost < 1.0;
+  for (std::size_t k = 0; k < pairs.size(); ++k) {
+    const double r = SampsonDistance(pairs[k], R_j_i, model.direction);
+    const bool behind = pairs[k].bearing_j.dot(R_j_i * pairs[k].bearing_i) < 0.0;
+    const bool inlier = !behind && std::abs(r) < threshold;
+    product *= inlier ? 1.0 + r * r / (finest * finest) : outlier;
+    count += inlier;
+    if (k % kFactors == kFactors - 1) {
+      score += std::log(product);
+      product = 1.0;
+    }
   }
   *num_inliers = count;
-  return score;
+  return score + std::log(product);
 }
 
-// Direction in which the pairs' residual flow points best, the rotation given.
-Eigen::Vector3d DirectionFor(const std::vector<BearingPair>& pairs, const Rotation& j_from_i) {
+// Directions in which the translation may point, the rotation given, the best one first.
+Eigen::Matrix3d DirectionsFor(const std::vector<BearingPair>& pairs, const Rotation& j_from_i) {
   Eigen::Matrix3d M = Eigen::Matrix3d::Zero();
   const Eigen::Matrix3d R_j_i = j_from_i.Matrix();
   for (const BearingPair& pair : pairs) {
@@ -196,7 +211,7 @@ Eigen::Vector3d DirectionFor(const std::vector<BearingPair>& pairs, const Rotati
     // Normalising bounds what one wrong match can do.
     M += n * n.transpose() / (n.squaredNorm() + 1e-6);
   }
-  return Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d>(M).eigenvectors().col(0);
+  return Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d>(M).eigenvectors();
 }
 
 int SamplesNeeded(double inlier_ratio, int sample_size, double confidence, int max_samples) {
@@ -221,70 +236,20 @@ class Sampler {
     return drawn_;
   }
 
+  // A vector inside the unit ball.
+  Eigen::Vector3d DrawInBall() {
+    const auto uniform = [&] { return static_cast<double>(random_() >> 11) * 0x1.0p-52 - 1.0; };
+    while (true) {
+      const Eigen::Vector3d vector(uniform(), uniform(), uniform());
+      if (vector.squaredNorm() <= 1.0) return vector;
+    }
+  }
+
  private:
   int population_;
   std::mt19937_64 random_;
   std::vector<int> drawn_;
 };
-
-struct Consensus {
-  EpipolarModel model;
-  int num_inliers = 0;
-  int num_samples = 0;
-};
-
-Consensus FindConsensus(const std::vector<BearingPair>& pairs,
-                        const Rotation& predicted,
-                        double threshold,
-                        const RelativeRotationOptions& options,
-                        std::uint64_t seed) {
-  Consensus best;
-  best.model = {predicted, DirectionFor(pairs, predicted)};
-  double best_score = Score(pairs, best.model, threshold, &best.num_inliers);
-  const auto consider = [&](const EpipolarModel& model) {
-    int num_inliers = 0;
-    const double score = Score(pairs, model, threshold, &num_inliers);
-    if (score >= best_score) return false;
-    best_score = score;
-    best.model = model;
-    best.num_inliers = num_inliers;
-    return true;
-  };
-  const auto polish = [&] { consider(RefineEpipolar(pairs, best.model, 0.5 * threshold, 3)); };
-  const int num_pairs = static_cast<int>(pairs.size());
-  const int sample_size = std::min(options.sample_size, num_pairs);
-  const auto samples_needed = [&] {
-    const double ratio = static_cast<double>(best.num_inliers) / num_pairs;
-    return SamplesNeeded(ratio, sample_size, options.confidence, options.max_samples);
-  };
-  polish();
-
-  Sampler sampler(num_pairs, seed);
-  int needed = samples_needed();
-  std::vector<BearingPair> sample;
-  for (best.num_samples = 0; best.num_samples < needed; ++best.num_samples) {
-    bool improved = false;
-    // Two bearings fix a rotation when the baseline is small: cheap, and the way out of a bad
-    // prediction.
-    sample.clear();
-    for (const int index : sampler.Draw(2)) sample.push_back(pairs[index]);
-    if (const std::optional<Rotation> rotation = AlignBearings(sample)) {
-      improved |= consider({*rotation, best.model.direction});
-    }
-    // Large samples bear noise and small baselines better, small ones miss the wrong matches more
-    // often.
-    const int size = best.num_samples % 2 == 0 ? sample_size : std::min(kSmallSample, num_pairs);
-    NormalEpipolarSums sums;
-    for (const int index : sampler.Draw(size)) sums.Add(pairs[index]);
-    const NormalEpipolarMinimum minimum = MinimizeNormalEpipolar(sums, best.model.j_from_i, 10);
-    improved |= consider({minimum.j_from_i, minimum.translation_direction});
-    if (improved) {
-      polish();
-      needed = samples_needed();
-    }
-  }
-  return best;
-}
 
 double Median(std::vector<double> values) {
   const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
@@ -305,6 +270,110 @@ double NoiseOf(const std::vector<BearingPair>& pairs,
   }
   // 1.4826: from the median absolute value to the standard deviation of a normal.
   return distances.empty() ? threshold : std::max(1.4826 * Median(std::move(distances)), smallest);
+}
+
+// Refines at the scale of the noise that the model itself shows, again and again as that comes
+// down.
+EpipolarModel Descend(const std::vector<BearingPair>& pairs,
+                      EpipolarModel model,
+                      double threshold,
+                      double smallest_noise,
+                      double loss_sigmas) {
+  constexpr int kScales = 3;
+  constexpr int kIterations = 4;
+  for (int k = 0; k < kScales; ++k) {
+    const double noise = NoiseOf(pairs, model, threshold, smallest_noise);
+    model = RefineEpipolar(pairs, model, loss_sigmas * noise, kIterations);
+  }
+  return model;
+}
+
+// About `count` of the pairs, evenly spread over their order.
+std::vector<BearingPair> Thinned(const std::vector<BearingPair>& pairs, std::size_t count) {
+  std::vector<BearingPair> thinned;
+  const std::size_t step = std::max<std::size_t>(1, pairs.size() / count);
+  for (std::size_t k = 0; k < pairs.size(); k += step) thinned.push_back(pairs[k]);
+  return thinned;
+}
+
+struct Consensus {
+  EpipolarModel model;
+  int num_inliers = 0;
+  int num_samples = 0;
+};
+
+// With little parallax the epipolar distance has several minima, a rotation traded for a
+// translation. So the search descends from the prediction and from the rotation that aligns the
+// bearings best, each with every principal direction of the flow, and then from small samples.
+Consensus FindConsensus(const std::vector<BearingPair>& pairs,
+                        const Rotation& predicted,
+                        double focal_px,
+                        const RelativeRotationOptions& options,
+                        std::uint64_t seed) {
+  constexpr std::size_t kThinnedSize = 250;
+  const double threshold = options.inlier_px / focal_px;
+  const double smallest_noise = options.min_noise_px / focal_px;
+  const double finest = options.finest_px / focal_px;
+  const std::vector<BearingPair> thinned = Thinned(pairs, kThinnedSize);
+
+  Consensus best;
+  double best_score = std::numeric_limits<double>::infinity();
+  const auto consider = [&](const EpipolarModel& model) {
+    int num_inliers = 0;
+    const double score = Score(pairs, model, threshold, finest, &num_inliers);
+    if (score >= best_score) return false;
+    best_score = score;
+    best.model = model;
+    best.num_inliers = num_inliers;
+    return true;
+  };
+  const auto polish = [&] {
+    consider(Descend(thinned, best.model, threshold, smallest_noise, options.loss_sigmas));
+  };
+
+  for (const Rotation& rotation :
+       {predicted, RefineRotation(thinned, predicted, threshold, 8).j_from_i}) {
+    const Eigen::Matrix3d directions = DirectionsFor(thinned, rotation);
+    for (int k = 0; k < 3; ++k) {
+      consider(Descend(
+          thinned, {rotation, directions.col(k)}, threshold, smallest_noise, options.loss_sigmas));
+    }
+  }
+
+  const int num_pairs = static_cast<int>(pairs.size());
+  const int sample_size = std::min(options.sample_size, num_pairs);
+  const auto samples_needed = [&] {
+    const double ratio = static_cast<double>(best.num_inliers) / num_pairs;
+    const int needed = SamplesNeeded(ratio, sample_size, options.confidence, options.max_samples);
+    return std::max(needed, std::min(options.min_samples, options.max_samples));
+  };
+  Sampler sampler(num_pairs, seed);
+  int needed = samples_needed();
+  std::vector<BearingPair> sample;
+  for (best.num_samples = 0; best.num_samples < needed; ++best.num_samples) {
+    bool improved = false;
+    // Two bearings fix a rotation when the baseline is small: cheap, and the way out of a bad
+    // prediction.
+    sample.clear();
+    for (const int index : sampler.Draw(2)) sample.push_back(pairs[index]);
+    if (const std::optional<Rotation> rotation = AlignBearings(sample)) {
+      improved |= consider({*rotation, best.model.direction});
+    }
+    // Large samples bear noise and small baselines better, small ones miss the wrong matches more
+    // often.
+    const int size = best.num_samples % 2 == 0 ? sample_size : std::min(kSmallSample, num_pairs);
+    NormalEpipolarSums sums;
+    for (const int index : sampler.Draw(size)) sums.Add(pairs[index]);
+    const Rotation start =
+        Rotation::Exp(kStartScatterDeg * kRadFromDeg * sampler.DrawInBall()) * best.model.j_from_i;
+    const NormalEpipolarMinimum minimum = MinimizeNormalEpipolar(sums, start, 10);
+    improved |= consider({minimum.j_from_i, minimum.translation_direction});
+    if (improved) {
+      polish();
+      needed = samples_needed();
+    }
+  }
+  return best;
 }
 
 // Torr's geometric information criterion for four-dimensional data (two image points a match).
@@ -360,6 +429,8 @@ std::optional<std::string> RelativeRotationOptions::Problem() const {
   if (!(shared_error_px >= 0.0)) {
     return OutOfRange("shared_error_px", shared_error_px, "zero or more");
   }
+  if (!(finest_px > 0.0)) return OutOfRange("finest_px", finest_px, "positive");
+  if (min_samples < 0) return OutOfRange("min_samples", min_samples, "zero or more");
   if (sample_size < 5) return OutOfRange("sample_size", sample_size, "at least 5");
   if (!(confidence > 0.0 && confidence < 1.0)) {
     return "confidence = " + std::to_string(confidence) + ": must lie between 0 and 1";
@@ -388,10 +459,10 @@ std::optional<RelativeRotationEstimate> EstimateRelativeRotation(
   if (static_cast<int>(pairs.size()) < options.min_inliers) return std::nullopt;
 
   const double threshold = options.inlier_px / focal_px;
-  const Consensus consensus = FindConsensus(pairs, predicted_j_from_i, threshold, options, seed);
+  const double smallest_noise = options.min_noise_px / focal_px;
+  const Consensus consensus = FindConsensus(pairs, predicted_j_from_i, focal_px, options, seed);
   if (consensus.num_inliers < options.min_inliers) return std::nullopt;
 
-  const double smallest_noise = options.min_noise_px / focal_px;
   const double loss =
       options.loss_sigmas * NoiseOf(pairs, consensus.model, threshold, smallest_noise);
   const EpipolarModel epipolar =

@@ -23,12 +23,16 @@ struct RelativeRotationOptions {
   // patches deform as the view turns. A baseline must show more flow than this to count as
   // evidence.
   double shared_error_px = 0.1;
+  // Finest scale at which hypotheses are told apart; well-refined matches scatter by 0.03 to 0.2
+  // px.
+  double finest_px = 0.1;
   // Matches per sample of the normal epipolar solver: fewer fail at small baselines, more meet an
   // outlier. Every other sample is a small one.
   int sample_size = 10;
   // Sampling stops when a better hypothesis is less likely than 1 - confidence, and at max_samples
   // in any case.
   double confidence = 0.999;
+  int min_samples = 20;
   int max_samples = 400;
   // Gauss-Newton steps on all matches at the end.
   int refine_iterations = 12;
@@ -44,8 +48,10 @@ struct RelativeRotationOptions {
     visit("loss_sigmas", loss_sigmas);
     visit("min_noise_px", min_noise_px);
     visit("shared_error_px", shared_error_px);
+    visit("finest_px", finest_px);
     visit("sample_size", sample_size);
     visit("confidence", confidence);
+    visit("min_samples", min_samples);
     visit("max_samples", max_samples);
     visit("refine_iterations", refine_iterations);
     visit("min_inliers", min_inliers);
