@@ -1,5 +1,6 @@
 #include "apps/orientations.h"
 
+#include <algorithm>
 #include <iterator>
 #include <stdexcept>
 
@@ -30,6 +31,21 @@ void InterpolateUnconnected(Orientations& orientations) {
   }
 }
 
+std::vector<FrameId> FindBreaks(const ViewGraph& graph, const RotationMap& rotations) {
+  std::vector<FrameId> breaks;
+  bool is_first = true;
+  for (const auto& [frame, rotation] : rotations) {
+    const std::vector<int>& edges = graph.EdgesOf(frame);
+    if (edges.empty()) continue;
+    const bool reaches_back = std::any_of(edges.begin(), edges.end(), [&, f = frame](int index) {
+      return graph.edges()[index].i < f;
+    });
+    if (!reaches_back && !is_first) breaks.push_back(frame);
+    is_first = false;
+  }
+  return breaks;
+}
+
 }  // namespace
 
 Orientations FindOrientations(Input& input,
@@ -50,10 +66,7 @@ Orientations FindOrientations(Input& input,
     orientations.num_weak += report.weak;
     progress.Step(frame->id.value + 1, std::to_string(report.num_inliers) + " inliers");
   }
-  orientations.cam_from_world = odometry.cam_from_world();
-  orientations.graph = odometry.graph();
-  orientations.edge_matches = odometry.edge_matches();
-  orientations.features = odometry.features();
+  static_cast<OdometryResult&>(orientations) = std::move(odometry).TakeResult();
 
   const int num_frames = static_cast<int>(orientations.timestamps_s.size());
   if (num_frames < 3) {
@@ -70,11 +83,16 @@ Orientations FindOrientations(Input& input,
     orientations.num_predicted += orientations.graph.EdgesOf(frame).empty();
   }
   InterpolateUnconnected(orientations);
+  orientations.breaks = FindBreaks(orientations.graph, orientations.cam_from_world);
   progress.EndStage(std::to_string(num_frames) + " frames, " +
                     std::to_string(orientations.graph.edges().size()) + " edges");
   if (orientations.num_predicted > 0) {
     progress.Warn(std::to_string(orientations.num_predicted) +
                   " frames match no other; their orientations are interpolated");
+  }
+  for (const FrameId frame : orientations.breaks) {
+    progress.Warn("frame " + std::to_string(frame.value) +
+                  " matches none before it; the turn across this gap is extrapolated");
   }
   return orientations;
 }

@@ -234,12 +234,35 @@ void PlaceRemainingFrames(const std::vector<Track>& all_tracks,
   }
 }
 
+// Points of all tracks, not only the keyframes', from the poses of all frames.
+Reconstruction MakeCloudOf(const PositionResult& result,
+                           const std::vector<Track>& all_tracks,
+                           const Camera& camera,
+                           const BundleOptions& options) {
+  BundleProblem problem;
+  problem.camera = camera;
+  problem.start.cam_from_world = result.cam_from_world;
+  problem.start.center_in_world = result.center_in_world;
+  problem.start.point_in_world = result.map.point_in_world;
+  problem.start.tracks = all_tracks;
+  std::erase_if(problem.start.tracks, [&](const Track& track) {
+    return static_cast<int>(track.observations.size()) < options.min_observations;
+  });
+  for (const HeldStretch& stretch : result.held) {
+    for (const auto& [frame, rotation] : result.cam_from_world) {
+      if (stretch.first < frame && frame <= stretch.last)
+        problem.shared_center[frame] = stretch.first;
+    }
+  }
+  return TriangulateTracks(problem, options);
+}
+
 // No map: every frame stands at the origin.
-PositionResult WithoutMap(PositionResult result, std::string message) {
+PositionResult WithoutMap(PositionResult result, std::string failure) {
   for (const auto& [frame, rotation] : result.cam_from_world) {
     result.center_in_world[frame] = Eigen::Vector3d::Zero();
   }
-  result.message = std::move(message);
+  result.failure = std::move(failure);
   return result;
 }
 
@@ -266,8 +289,8 @@ PositionResult FindPositions(const Orientations& orientations,
                     std::to_string(result.held.size()) + " pure-rotation stretches");
   const HeldStretch* everything = StretchAt(result.held, result.cam_from_world.begin()->first);
   if (everything != nullptr && everything->last == result.cam_from_world.rbegin()->first) {
-    return WithoutMap(std::move(result),
-                      "the camera only rotates, so there are no positions and no points to find");
+    result.is_held_throughout = true;
+    return WithoutMap(std::move(result), {});
   }
 
   progress.StartStage("known rotation", -1);
@@ -315,6 +338,10 @@ PositionResult FindPositions(const Orientations& orientations,
       all_tracks, orientations.timestamps_s, camera, options.resection, num_threads, result);
   progress.EndStage(std::to_string(result.num_resected) + " resected, " +
                     std::to_string(result.num_interpolated) + " interpolated");
+
+  progress.StartStage("cloud", -1);
+  result.cloud = MakeCloudOf(result, all_tracks, camera, bundle_options);
+  progress.EndStage(std::to_string(result.cloud.point_in_world.size()) + " points");
   return result;
 }
 

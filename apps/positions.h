@@ -20,14 +20,16 @@ struct PositionResult {
   RotationMap cam_from_world;  // of every frame
   CenterMap center_in_world;   // of every frame
   Reconstruction map;          // refined keyframes, points and their tracks
+  Reconstruction cloud;        // every frame, and every track that its poses explain
   std::set<FrameId> keyframes;
   std::vector<HeldStretch> held;
   std::vector<MapComponent> components;  // by their first keyframe
   KrotSolution krot;
   std::vector<BundleSummary> bundles;  // one per component
   int num_resected = 0;
-  int num_interpolated = 0;  // frames between keyframes whose position is interpolated
-  std::string message;       // why there is no map; empty when there is one
+  int num_interpolated = 0;         // frames between keyframes whose position is interpolated
+  bool is_held_throughout = false;  // the camera never changes its place: nothing to find
+  std::string failure;              // why there is no map; empty when there is one
 };
 
 /// From orientations to positions and points: keyframes and tracks, the known-rotation problem,

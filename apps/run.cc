@@ -1,8 +1,8 @@
 #include <chrono>
 #include <memory>
+#include <stdexcept>
 
 #include "apps/command.h"
-#include "apps/config.h"
 #include "apps/orientations.h"
 #include "apps/pipeline.h"
 #include "apps/positions.h"
@@ -28,9 +28,7 @@ double SecondsSince(Clock::time_point start) {
 int Run(const RunFlags& flags) {
   const Clock::time_point start = Clock::now();
   Progress progress(flags.common.quiet);
-  PipelineOptions options;
-  if (!flags.common.config.empty()) LoadOptionsYaml(flags.common.config, options);
-  flags.input.Override(options.sequence);
+  const PipelineOptions options = ReadPipelineOptions(flags.common, flags.input);
 
   Input input = OpenInput(
       flags.input, options.sequence, [&](const std::string& line) { progress.Say(line); });
@@ -56,11 +54,16 @@ int Run(const RunFlags& flags) {
                   std::to_string(positions.components[k].keyframes.begin()->value) +
                   " on to the part before; it is set so that the speed is continuous");
   }
-  if (!positions.message.empty()) progress.Warn("no map: " + positions.message);
+  if (positions.is_held_throughout) {
+    progress.Warn(
+        "the camera never leaves its place, so there are no positions and no points to find");
+  }
   progress.Say("wrote " + directory.string() +
                ": trajectory_tum.txt, trajectory_kitti.txt, keyframes_tum.txt, "
                "rotations_tum.txt, cloud.ply, segments.csv, view_graph.g2o, summary.json");
-  return 0;
+  if (positions.failure.empty()) return 0;
+  throw std::runtime_error("orientations are in " + directory.string() +
+                           ", positions are not: " + positions.failure);
 }
 
 }  // namespace

@@ -99,7 +99,7 @@ void WritePositions(const std::filesystem::path& directory,
       directory / "keyframes_tum.txt",
       MakeTrajectory(orientations.timestamps_s, positions.cam_from_world, keyframe_centers));
   WritePly(directory / "cloud.ply",
-           MakeCloud(WithoutShallowPoints(positions.map, cloud_min_angle_deg), camera));
+           MakeCloud(WithoutShallowPoints(positions.cloud, cloud_min_angle_deg), camera));
   WriteSegments(directory / "segments.csv", Segments(positions));
 }
 
@@ -120,6 +120,7 @@ RunSummary StartSummary(const std::string& command,
                     {"unreadable_frames", std::int64_t{orientations.num_unreadable}},
                     {"frames_without_edge", std::int64_t{orientations.num_predicted}},
                     {"frames_with_weak_edge", std::int64_t{orientations.num_weak}},
+                    {"breaks", count(orientations.breaks.size())},
                     {"edges", count(orientations.graph.edges().size())}};
   double inliers = 0.0;
   std::int64_t rotation_only = 0;
@@ -136,7 +137,8 @@ RunSummary StartSummary(const std::string& command,
 void AddPositions(const PositionResult& positions, const Camera& camera, RunSummary& summary) {
   const auto count = [](std::size_t value) { return static_cast<std::int64_t>(value); };
   summary.counts.push_back({"keyframes", count(positions.keyframes.size())});
-  summary.counts.push_back({"points", count(positions.map.point_in_world.size())});
+  summary.counts.push_back({"map_points", count(positions.map.point_in_world.size())});
+  summary.counts.push_back({"points", count(positions.cloud.point_in_world.size())});
   summary.counts.push_back({"components", count(positions.components.size())});
   summary.counts.push_back({"resected_frames", std::int64_t{positions.num_resected}});
   summary.counts.push_back({"interpolated_frames", std::int64_t{positions.num_interpolated}});

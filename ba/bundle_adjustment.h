@@ -112,6 +112,12 @@ struct BundleResult {
 /// ours.
 BundleResult RefineBundle(const BundleProblem& problem, const BundleOptions& options);
 
+/// Triangulates all tracks of `problem` against its cameras, which stay as they are, and keeps the
+/// observations within `options.fine.max_error_px`: more points, seen from more frames, for a
+/// cloud.
+/// @return  the poses of the start with those points and tracks; the same contract as RefineBundle.
+Reconstruction TriangulateTracks(const BundleProblem& problem, const BundleOptions& options);
+
 /// The reconstruction without the points (and their tracks) whose rays nowhere meet at
 /// `min_angle_deg`. Shallow points help rotations but spread along the line of sight, which is not
 /// what one wants to look at.

@@ -4,18 +4,13 @@
 #include <iterator>
 #include <stdexcept>
 
+#include "rotodom/types/options.h"
+
 namespace rotslam {
 namespace {
 
 // Positions of the same corner that differ by more than this are not averaged.
 constexpr double kSameCornerPx = 1.0;
-
-template <class Options>
-std::optional<std::string> ProblemIn(const char* name, const Options& options) {
-  const std::optional<std::string> problem = options.Problem();
-  if (!problem) return std::nullopt;
-  return std::string(name) + "." + *problem;
-}
 
 // Gives every keypoint of `features` that a connection has located the mean of those positions, so
 // that a track follows one point of the scene instead of the detector's grid.
@@ -65,12 +60,12 @@ RotationalOdometry::RotationalOdometry(const Camera& camera,
 }
 
 FrameReport RotationalOdometry::AddFrame(FrameId frame, double timestamp_s, const cv::Mat& image) {
-  if (!cam_from_world_.empty() && frame <= cam_from_world_.rbegin()->first) {
+  if (!result_.cam_from_world.empty() && frame <= result_.cam_from_world.rbegin()->first) {
     throw std::invalid_argument("RotationalOdometry: frame ids must ascend");
   }
   FrameReport report;
   report.frame = frame;
-  cam_from_world_[frame] = PredictOrientation(timestamp_s);
+  result_.cam_from_world[frame] = PredictOrientation(timestamp_s);
   timestamps_s_[frame] = timestamp_s;
   if (image.empty()) {
     report.predicted_only = true;
@@ -87,30 +82,33 @@ FrameReport RotationalOdometry::AddFrame(FrameId frame, double timestamp_s, cons
   ConnectOptions connect_options{
       options_.features, options_.matching, options_.relative_rotation, seed_, num_threads_};
   std::vector<Connection> connections =
-      ConnectView(view, others, cam_from_world_, camera_, connect_options);
+      ConnectView(view, others, result_.cam_from_world, camera_, connect_options);
   KeepGoodConnections(connections, report);
   SharpenKeypoints(connections, camera_, view.features);
 
   report.predicted_only = connections.empty() && !recent_.empty();
   StartFromBestEdge(frame, connections);
   for (Connection& connection : connections) {
-    graph_.AddEdge(connection.edge);
-    edge_matches_.push_back(std::move(connection.matches));
+    result_.graph.AddEdge(connection.edge);
+    result_.edge_matches.push_back(std::move(connection.matches));
   }
   AverageWindow();
 
   Features kept = view.features;
   kept.descriptors.release();
-  features_[frame] = std::move(kept);
-  recent_.push_back(std::move(view));
-  if (static_cast<int>(recent_.size()) > options_.view_graph.window_frames) recent_.pop_front();
+  result_.features[frame] = std::move(kept);
+  // A black or blurred frame is no partner for the next ones; those before it may still be.
+  if (view.features.size() >= options_.relative_rotation.min_inliers) {
+    recent_.push_back(std::move(view));
+    if (static_cast<int>(recent_.size()) > options_.view_graph.window_frames) recent_.pop_front();
+  }
   return report;
 }
 
 Rotation RotationalOdometry::PredictOrientation(double timestamp_s) const {
-  if (cam_from_world_.empty()) return Rotation();
-  const auto last = std::prev(cam_from_world_.end());
-  if (last == cam_from_world_.begin()) return last->second;
+  if (result_.cam_from_world.empty()) return Rotation();
+  const auto last = std::prev(result_.cam_from_world.end());
+  if (last == result_.cam_from_world.begin()) return last->second;
   const auto before = std::prev(last);
   const double step_s = timestamps_s_.at(last->first) - timestamps_s_.at(before->first);
   const double ahead_s = timestamp_s - timestamps_s_.at(last->first);
@@ -150,18 +148,19 @@ void RotationalOdometry::StartFromBestEdge(FrameId frame,
         return a.edge.num_inliers < b.edge.num_inliers;
       });
   if (best == connections.end()) return;
-  cam_from_world_[frame] = best->edge.j_from_i * cam_from_world_.at(best->edge.i);
+  result_.cam_from_world[frame] = best->edge.j_from_i * result_.cam_from_world.at(best->edge.i);
 }
 
 void RotationalOdometry::AverageWindow() {
   std::set<FrameId> window;
-  for (auto entry = cam_from_world_.rbegin(); entry != cam_from_world_.rend(); ++entry) {
+  for (auto entry = result_.cam_from_world.rbegin(); entry != result_.cam_from_world.rend();
+       ++entry) {
     if (static_cast<int>(window.size()) == options_.averaging.window) break;
     // The first frame defines the world.
-    if (entry->first != cam_from_world_.begin()->first) window.insert(entry->first);
+    if (entry->first != result_.cam_from_world.begin()->first) window.insert(entry->first);
   }
-  cam_from_world_ =
-      AverageRotations(graph_, std::move(cam_from_world_), window, options_.averaging);
+  result_.cam_from_world = AverageRotations(
+      result_.graph, std::move(result_.cam_from_world), window, options_.averaging);
 }
 
 }  // namespace rotslam

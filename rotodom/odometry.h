@@ -4,6 +4,7 @@
 #include <map>
 #include <optional>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "rotodom/averaging/averaging.h"
@@ -41,6 +42,14 @@ struct FrameReport {
   bool searched_wide = false;   // the prediction did not guide the matching
 };
 
+/// What is known when the sequence has ended.
+struct OdometryResult {
+  ViewGraph graph;
+  RotationMap cam_from_world;  // one entry per frame
+  std::vector<EdgeMatches> edge_matches;
+  std::map<FrameId, Features> features;  // descriptors left out
+};
+
 /// Orientations from 2-D matches alone, frame by frame: features, edges to the frames before,
 /// windowed averaging. Owns all that survives a frame. Source:  Chng et al., Monocular Rotational
 /// Odometry with Incremental Rotation Averaging and Loop Closure.
@@ -56,10 +65,10 @@ class RotationalOdometry {
   /// orientation and no edge.
   FrameReport AddFrame(FrameId frame, double timestamp_s, const cv::Mat& image);
 
-  const ViewGraph& graph() const { return graph_; }
-  const RotationMap& cam_from_world() const { return cam_from_world_; }  // one entry per frame
-  const std::vector<EdgeMatches>& edge_matches() const { return edge_matches_; }
-  const std::map<FrameId, Features>& features() const { return features_; }  // descriptors left out
+  /// The state so far; valid until the next frame.
+  const OdometryResult& result() const { return result_; }
+  /// The same, moved out of an odometry that is no longer needed.
+  OdometryResult TakeResult() && { return std::move(result_); }
 
  private:
   Rotation PredictOrientation(double timestamp_s) const;
@@ -74,10 +83,7 @@ class RotationalOdometry {
 
   std::deque<View> recent_;  // newest last
   std::map<FrameId, double> timestamps_s_;
-  ViewGraph graph_;
-  RotationMap cam_from_world_;
-  std::vector<EdgeMatches> edge_matches_;
-  std::map<FrameId, Features> features_;
+  OdometryResult result_;
 };
 
 }  // namespace rotslam
