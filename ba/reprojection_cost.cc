@@ -46,7 +46,7 @@ std::optional<Eigen::Vector2d> Reproject(const Camera& camera,
   const Eigen::Vector3d point_in_cam = R_c_w * (point_in_world - center_in_world);
   if (J == nullptr) return camera.Project(point_in_cam);
   Eigen::Matrix<double, 2, 3> J_project;
-  const std::optional<Eigen::Vector2d> pixel = camera.Project(point_in_cam, &J_project);
+  std::optional<Eigen::Vector2d> pixel = camera.Project(point_in_cam, &J_project);
   if (!pixel) return std::nullopt;
   // Exp(delta) p = p + delta x p, to first order.
   J->by_rotation.noalias() = -J_project * Skew(point_in_cam);

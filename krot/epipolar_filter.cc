@@ -93,6 +93,7 @@ PairMap CollectShared(const RotationMap& cam_from_world,
   for (int t = 0; t < static_cast<int>(tracks.size()); ++t) {
     const auto& observations = tracks[t].observations;
     std::vector<Eigen::Vector3d> rays;
+    rays.reserve(observations.size());
     for (const Observation& observation : observations) {
       rays.push_back(cam_from_world.at(observation.frame).Inverse() * observation.bearing);
     }

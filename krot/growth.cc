@@ -45,7 +45,7 @@ class Growth {
       const Observation& observation = tracks_[sight.track].observations[sight.observation];
       rays.push_back({*points_[sight.track], world_from_cam * observation.bearing});
     }
-    ResectionOptions resection_options = options_.resection;
+    CenterResectionOptions resection_options = options_.resection;
     resection_options.seed += static_cast<std::uint64_t>(view.value) * 7919u;
     const auto resection = ResectCenter(rays, resection_options);
     if (!resection || static_cast<int>(resection->inliers.size()) < options_.min_points) {

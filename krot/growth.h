@@ -10,7 +10,7 @@
 namespace rotslam {
 
 struct GrowthOptions {
-  ResectionOptions resection;
+  CenterResectionOptions resection;
   // A view is placed when it sees this many known points and as many agree on its position.
   int min_points = 6;
   // Parallax under which a new point counts as known.

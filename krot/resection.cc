@@ -66,7 +66,7 @@ std::optional<Eigen::Vector3d> Refine(const std::vector<RayToPoint>& rays,
 }  // namespace
 
 std::optional<Resection> ResectCenter(const std::vector<RayToPoint>& rays,
-                                      const ResectionOptions& options) {
+                                      const CenterResectionOptions& options) {
   const int count = static_cast<int>(rays.size());
   if (count < 3) return std::nullopt;
   Draw draw(options.seed);

@@ -14,7 +14,8 @@ struct RayToPoint {
   Eigen::Vector3d ray_in_world;  // unit, from the unknown centre
 };
 
-struct ResectionOptions {
+// Not ba's ResectionOptions: both live in namespace rotslam, where a name has one meaning.
+struct CenterResectionOptions {
   double threshold_rad = 0.0057;  // inlier angle; 4 px at f = 700
   int max_samples = 200;
   std::uint64_t seed = 1;
@@ -31,6 +32,6 @@ struct Resection {
 /// @return  nullopt when fewer than three lines agree or they leave the centre open.
 /// Error:   exact on exact input (1e-9 of the scene's size).
 std::optional<Resection> ResectCenter(const std::vector<RayToPoint>& rays,
-                                      const ResectionOptions& options);
+                                      const CenterResectionOptions& options);
 
 }  // namespace rotslam

@@ -17,6 +17,7 @@ std::vector<int> Agreeing(const std::vector<Sighting>& sightings,
 
 std::vector<Sighting> Pick(const std::vector<Sighting>& sightings, const std::vector<int>& chosen) {
   std::vector<Sighting> picked;
+  picked.reserve(chosen.size());
   for (const int k : chosen) picked.push_back(sightings[k]);
   return picked;
 }

@@ -2,7 +2,6 @@
 
 #include <cerrno>
 #include <cstdio>
-#include <cstring>
 #include <stdexcept>
 #include <string>
 #include <system_error>
@@ -19,13 +18,13 @@ void WriteWhole(const std::filesystem::path& path,
                 const std::filesystem::path& temporary,
                 std::string_view content) {
   std::FILE* file = std::fopen(temporary.c_str(), "wb");
-  if (file == nullptr) Refuse(path, std::strerror(errno));
+  if (file == nullptr) Refuse(path, std::generic_category().message(errno));
   const bool wrote =
       content.empty() || std::fwrite(content.data(), 1, content.size(), file) == content.size();
   const int write_error = errno;
   const bool closed = std::fclose(file) == 0;
-  if (!wrote) Refuse(path, std::strerror(write_error));
-  if (!closed) Refuse(path, std::strerror(errno));
+  if (!wrote) Refuse(path, std::generic_category().message(write_error));
+  if (!closed) Refuse(path, std::generic_category().message(errno));
 }
 
 }  // namespace

@@ -5,7 +5,6 @@
 #include <charconv>
 #include <cmath>
 #include <cstdio>
-#include <cstring>
 #include <fstream>
 #include <stdexcept>
 #include <string_view>
@@ -34,7 +33,8 @@ std::vector<TextRow> ReadTextRows(const std::filesystem::path& path) {
     throw std::runtime_error(path.string() + ": is a folder, not a file");
   }
   std::ifstream file(path);
-  if (!file) throw std::runtime_error(path.string() + ": " + std::strerror(errno));
+  if (!file)
+    throw std::runtime_error(path.string() + ": " + std::generic_category().message(errno));
   std::vector<TextRow> rows;
   std::string line;
   for (int number = 1; std::getline(file, line); ++number) {

@@ -31,5 +31,5 @@ echo
 echo "accuracy against the exact truth:"
 "$rotslam" eval "$truth" "$result/trajectory_tum.txt" --images "$images"
 echo
-echo "written to $PWD/$result:"
-ls -1 "$result"
+echo "written:"
+printf '%s\n' "$PWD/$result"/*

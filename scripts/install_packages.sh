@@ -14,11 +14,11 @@ packages=(
   coinor-libclp-dev libceres-dev
   # output and apps
   libcli11-dev libpcl-dev nlohmann-json3-dev
-  # tests; OpenGV to compare with, numpy for the independent check of `rotslam eval`
-  libgmock-dev libgtest-dev libopengv-dev python3-numpy
+  # tests; GLPK and OpenGV to compare with, numpy for the independent check of `rotslam eval`
+  libglpk-dev libgmock-dev libgtest-dev libopengv-dev python3-numpy
 )
 if [[ ${1:-} == --ci ]]; then
-  packages+=(clang-format-14)
+  packages+=(clang-format-14 clang-tidy-14)
 elif [[ $# -gt 0 ]]; then
   echo "usage: ${0##*/} [--ci]" >&2
   exit 2
