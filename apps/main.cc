@@ -3,6 +3,8 @@
 #include <exception>
 #include <string>
 
+#include <opencv2/core/utility.hpp>
+
 #include "apps/command.h"
 
 namespace rotslam {
@@ -40,6 +42,8 @@ int main(int argc, char** argv) {
   CLI::App app("rotslam: camera path and sparse map from one calibrated video, rotations first",
                "rotslam");
   app.require_subcommand(1);
+  // Our stages bring their own threads; OpenCV's pool under them only gets in the way.
+  cv::setNumThreads(1);
   rotslam::Action action;
   rotslam::AddRunCommand(app, action);
   rotslam::AddRotationsCommand(app, action);

@@ -1,9 +1,11 @@
 #include "apps/orientations.h"
 
+#include <algorithm>
 #include <iterator>
 #include <stdexcept>
 
 namespace rotslam {
+
 void InterpolateUnconnected(const Orientations& orientations, RotationMap& rotations) {
   const auto connected = [&](FrameId frame) { return !orientations.graph.EdgesOf(frame).empty(); };
   for (auto entry = rotations.begin(); entry != rotations.end(); ++entry) {
@@ -25,6 +27,25 @@ void InterpolateUnconnected(const Orientations& orientations, RotationMap& rotat
     }
   }
 }
+
+namespace {
+
+std::vector<FrameId> FindBreaks(const ViewGraph& graph, const RotationMap& rotations) {
+  std::vector<FrameId> breaks;
+  bool is_first = true;
+  for (const auto& [frame, rotation] : rotations) {
+    const std::vector<int>& edges = graph.EdgesOf(frame);
+    if (edges.empty()) continue;
+    const bool reaches_back = std::any_of(edges.begin(), edges.end(), [&, f = frame](int index) {
+      return graph.edges()[index].i < f;
+    });
+    if (!reaches_back && !is_first) breaks.push_back(frame);
+    is_first = false;
+  }
+  return breaks;
+}
+
+}  // namespace
 
 Orientations FindOrientations(Input& input,
                               const OdometryOptions& options,
@@ -61,6 +82,7 @@ Orientations FindOrientations(Input& input,
     orientations.num_predicted += orientations.graph.EdgesOf(frame).empty();
   }
   InterpolateUnconnected(orientations, orientations.cam_from_world);
+  orientations.breaks = FindBreaks(orientations.graph, orientations.cam_from_world);
   progress.EndStage(std::to_string(num_frames) + " frames, " +
                     std::to_string(orientations.graph.edges().size()) + " edges");
   // The unreadable ones have had their warning.
@@ -68,6 +90,10 @@ Orientations FindOrientations(Input& input,
     progress.Warn(std::to_string(count) +
                   (count == 1 ? " frame matches no other; its orientation is interpolated"
                               : " frames match no other; their orientations are interpolated"));
+  }
+  for (const FrameId frame : orientations.breaks) {
+    progress.Warn("frame " + std::to_string(frame.value) +
+                  " matches none before it; the turn across this gap is extrapolated");
   }
   return orientations;
 }

@@ -15,6 +15,9 @@ struct Orientations : OdometryResult {
   int num_unreadable = 0;
   int num_predicted = 0;  // frames without an edge; their orientations are interpolated
   int num_weak = 0;
+  // Frames that match later frames but none before them: a new piece of the view-graph, whose turn
+  // against the piece before is extrapolated.
+  std::vector<FrameId> breaks;
 };
 
 /// Reads the sequence to its end and finds every frame's orientation. Frames that could not be

@@ -258,11 +258,11 @@ Reconstruction MakeCloudOf(const PositionResult& result,
 }
 
 // No map: every frame stands at the origin.
-PositionResult WithoutMap(PositionResult result, std::string message) {
+PositionResult WithoutMap(PositionResult result, std::string failure) {
   for (const auto& [frame, rotation] : result.cam_from_world) {
     result.center_in_world[frame] = Eigen::Vector3d::Zero();
   }
-  result.message = std::move(message);
+  result.failure = std::move(failure);
   return result;
 }
 
@@ -289,8 +289,8 @@ PositionResult FindPositions(const Orientations& orientations,
                     std::to_string(result.held.size()) + " pure-rotation stretches");
   const HeldStretch* everything = StretchAt(result.held, result.cam_from_world.begin()->first);
   if (everything != nullptr && everything->last == result.cam_from_world.rbegin()->first) {
-    return WithoutMap(std::move(result),
-                      "the camera only rotates, so there are no positions and no points to find");
+    result.is_held_throughout = true;
+    return WithoutMap(std::move(result), {});
   }
 
   progress.StartStage("known rotation", -1);

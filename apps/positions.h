@@ -27,8 +27,9 @@ struct PositionResult {
   KrotSolution krot;
   std::vector<BundleSummary> bundles;  // one per component
   int num_resected = 0;
-  int num_interpolated = 0;  // frames between keyframes whose position is interpolated
-  std::string message;       // why there is no map; empty when there is one
+  int num_interpolated = 0;         // frames between keyframes whose position is interpolated
+  bool is_held_throughout = false;  // the camera never changes its place: nothing to find
+  std::string failure;              // why there is no map; empty when there is one
 };
 
 /// From orientations to positions and points: keyframes and tracks, the known-rotation problem,

@@ -1,5 +1,6 @@
 #include <chrono>
 #include <memory>
+#include <stdexcept>
 
 #include "apps/command.h"
 #include "apps/config.h"
@@ -56,11 +57,16 @@ int Run(const RunFlags& flags) {
                   std::to_string(positions.components[k].keyframes.begin()->value) +
                   " on to the part before; it is set so that the speed is continuous");
   }
-  if (!positions.message.empty()) progress.Warn("no map: " + positions.message);
+  if (positions.is_held_throughout) {
+    progress.Warn(
+        "the camera never leaves its place, so there are no positions and no points to find");
+  }
   progress.Say("wrote " + directory.string() +
                ": trajectory_tum.txt, trajectory_kitti.txt, keyframes_tum.txt, "
                "rotations_tum.txt, cloud.ply, segments.csv, view_graph.g2o, summary.json");
-  return 0;
+  if (positions.failure.empty()) return 0;
+  throw std::runtime_error("orientations are in " + directory.string() +
+                           ", positions are not: " + positions.failure);
 }
 
 }  // namespace

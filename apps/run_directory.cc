@@ -121,6 +121,7 @@ RunSummary StartSummary(const std::string& command,
                     {"unreadable_frames", std::int64_t{orientations.num_unreadable}},
                     {"frames_without_edge", std::int64_t{orientations.num_predicted}},
                     {"frames_with_weak_edge", std::int64_t{orientations.num_weak}},
+                    {"breaks", count(orientations.breaks.size())},
                     {"edges", count(orientations.graph.edges().size())}};
   double inliers = 0.0;
   std::int64_t rotation_only = 0;

@@ -113,7 +113,8 @@ struct BundleResult {
 BundleResult RefineBundle(const BundleProblem& problem, const BundleOptions& options);
 
 /// Triangulates all tracks of `problem` against its cameras, which stay as they are, and keeps the
-/// observations within `options.fine.max_error_px`: more points, seen from more frames, for a cloud.
+/// observations within `options.fine.max_error_px`: more points, seen from more frames, for a
+/// cloud.
 /// @return  the poses of the start with those points and tracks; the same contract as RefineBundle.
 Reconstruction TriangulateTracks(const BundleProblem& problem, const BundleOptions& options);
 

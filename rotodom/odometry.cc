@@ -102,8 +102,11 @@ FrameReport RotationalOdometry::AddFrame(FrameId frame, double timestamp_s, cons
   Features kept = view.features;
   kept.descriptors.release();
   result_.features[frame] = std::move(kept);
-  recent_.push_back(std::move(view));
-  if (static_cast<int>(recent_.size()) > options_.view_graph.window_frames) recent_.pop_front();
+  // A black or blurred frame is no partner for the next ones; those before it may still be.
+  if (view.features.size() >= options_.relative_rotation.min_inliers) {
+    recent_.push_back(std::move(view));
+    if (static_cast<int>(recent_.size()) > options_.view_graph.window_frames) recent_.pop_front();
+  }
   return report;
 }
 

@@ -1,0 +1,122 @@
+#include "ba/bundle_state.h"
+
+#include <cmath>
+#include <map>
+#include <set>
+#include <stdexcept>
+#include <string>
+
+namespace rotslam {
+namespace {
+
+[[noreturn]] void Refuse(const std::string& reason) {
+  throw std::invalid_argument("RefineBundle: " + reason);
+}
+
+void CheckTrack(const Track& track) {
+  const std::string name = "track " + std::to_string(track.id.value);
+  std::set<FrameId> seen;
+  for (const Observation& observation : track.observations) {
+    const std::string where = name + ", frame " + std::to_string(observation.frame.value);
+    if (!seen.insert(observation.frame).second) Refuse(where + " is observed twice");
+    if (!observation.keypoint_px.allFinite() || !observation.bearing.allFinite()) {
+      Refuse(where + ": the observation is not finite");
+    }
+    if (!(observation.sigma_px > 0.0) || !std::isfinite(observation.sigma_px)) {
+      Refuse(where + ": sigma_px is " + std::to_string(observation.sigma_px) +
+             ", must be positive");
+    }
+  }
+}
+
+void CheckContract(const BundleProblem& problem, const BundleOptions& options) {
+  if (const auto text = options.Problem()) Refuse("option " + *text);
+  if (const auto text = problem.camera.Problem()) Refuse("camera " + *text);
+  const Reconstruction& start = problem.start;
+  const auto has_pose = [&](FrameId frame) {
+    return start.cam_from_world.contains(frame) && start.center_in_world.contains(frame);
+  };
+  for (const auto& [frame, center] : start.center_in_world) {
+    if (!center.allFinite()) {
+      Refuse("the centre of frame " + std::to_string(frame.value) + " is not finite");
+    }
+  }
+  for (const auto& [track, point] : start.point_in_world) {
+    if (!point.allFinite()) {
+      Refuse("the point of track " + std::to_string(track.value) + " is not finite");
+    }
+  }
+  for (const FrameId frame : problem.fixed_frames) {
+    if (!has_pose(frame)) {
+      Refuse("fixed frame " + std::to_string(frame.value) + " has no pose");
+    }
+  }
+  for (const auto& [frame, other] : problem.shared_center) {
+    if (!has_pose(frame) || !has_pose(other)) {
+      Refuse("frame " + std::to_string((has_pose(frame) ? other : frame).value) +
+             " shares a centre but has no pose");
+    }
+  }
+  std::set<TrackId> seen;
+  for (const Track& track : start.tracks) {
+    if (!seen.insert(track.id).second) {
+      Refuse("track " + std::to_string(track.id.value) + " is there twice");
+    }
+    CheckTrack(track);
+  }
+}
+
+// The frame whose centre `frame` uses.
+FrameId CenterOwner(const std::map<FrameId, FrameId>& shared_center, FrameId frame) {
+  FrameId owner = frame;
+  for (std::size_t step = 0; step <= shared_center.size(); ++step) {
+    const auto next = shared_center.find(owner);
+    if (next == shared_center.end() || next->second == owner) return owner;
+    owner = next->second;
+  }
+  Refuse("shared_center of frame " + std::to_string(frame.value) + " runs in a circle");
+}
+
+}  // namespace
+
+BundleState MakeBundleState(const BundleProblem& problem, const BundleOptions& options) {
+  CheckContract(problem, options);
+  BundleState state;
+  const Reconstruction& start = problem.start;
+  std::map<FrameId, int> frame_index;
+  std::map<FrameId, int> center_index;
+  for (const auto& [id, cam_from_world] : start.cam_from_world) {
+    if (!start.center_in_world.contains(id)) continue;
+    const FrameId owner = CenterOwner(problem.shared_center, id);
+    const auto [center, is_new] = center_index.try_emplace(owner, state.centers.size());
+    if (is_new) state.centers.push_back(start.center_in_world.at(owner));
+    frame_index[id] = static_cast<int>(state.frames.size());
+    FrameState frame;
+    frame.id = id;
+    frame.cam_from_world = cam_from_world;
+    frame.center = center->second;
+    frame.fixed = problem.fixed_frames.contains(id);
+    state.frames.push_back(frame);
+  }
+  for (const Track& track : start.tracks) {
+    TrackState entry;
+    entry.track = &track;
+    std::set<int> places;
+    for (const Observation& observation : track.observations) {
+      const auto frame = frame_index.find(observation.frame);
+      if (frame == frame_index.end()) continue;
+      entry.sights.push_back({&observation, frame->second, false});
+      places.insert(state.frames[frame->second].center);
+    }
+    entry.one_place = places.size() <= 1;
+    const auto point = start.point_in_world.find(track.id);
+    if (point != start.point_in_world.end() && !entry.one_place) {
+      entry.has_position = true;
+      entry.position = point->second;
+    }
+    state.tracks.push_back(std::move(entry));
+  }
+  return state;
+}
+
+}  // namespace rotslam

@@ -1,0 +1,53 @@
+#pragma once
+
+#include <vector>
+
+#include <Eigen/Core>
+
+#include "ba/bundle_adjustment.h"
+#include "rotodom/types/rotation.h"
+#include "rotodom/types/track.h"
+
+namespace rotslam {
+
+// What RefineBundle works on: poses and tracks by index, one block per centre. Not for callers of
+// ba.
+
+struct FrameState {
+  FrameId id;
+  Rotation cam_from_world;
+  int center = 0;      // index of its centre; frames that stand at one place share it
+  bool fixed = false;  // pose held by the caller
+  bool weak = false;   // too few observations to be in the last round
+};
+
+enum class TrackKind { kOut, kPoint, kDirection };
+
+// An observation in a frame that has a pose.
+struct Sight {
+  const Observation* observation = nullptr;
+  int frame = 0;
+  bool used = false;
+};
+
+struct TrackState {
+  const Track* track = nullptr;
+  std::vector<Sight> sights;
+  bool one_place = false;  // all sights from one centre: a direction, no depth
+  TrackKind kind = TrackKind::kOut;
+  bool has_position = false;
+  Eigen::Vector3d position;  // point in the world, or direction when seen from one place
+};
+
+struct BundleState {
+  std::vector<FrameState> frames;
+  std::vector<Eigen::Vector3d> centers;
+  std::vector<TrackState> tracks;
+};
+
+/// The problem's poses and the tracks that they see, nothing classified yet. The tracks stay the
+/// problem's: it must outlive the state.
+/// Throws std::invalid_argument where the contract of RefineBundle is broken.
+BundleState MakeBundleState(const BundleProblem& problem, const BundleOptions& options);
+
+}  // namespace rotslam

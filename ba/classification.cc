@@ -1,0 +1,264 @@
+#include "ba/classification.h"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <optional>
+#include <utility>
+
+#include "rotodom/types/parallel.h"
+#include "rotodom/types/triangulation.h"
+
+namespace rotslam {
+namespace {
+
+constexpr double kInfinity = std::numeric_limits<double>::infinity();
+// Two-view hypotheses for a track in which not all observations agree.
+constexpr int kMaxTrackHypotheses = 20;
+
+Sighting AsSighting(const BundleState& state, const Sight& sight, double focal_px) {
+  const FrameState& frame = state.frames[sight.frame];
+  return {frame.cam_from_world,
+          state.centers[frame.center],
+          sight.observation->bearing,
+          sight.observation->sigma_px / focal_px};
+}
+
+// Reprojection error in pixels; infinite where the camera cannot see the position.
+double ErrorPx(const Camera& camera,
+               const BundleState& state,
+               const TrackState& track,
+               const Sight& sight,
+               const Eigen::Vector3d& position) {
+  const FrameState& frame = state.frames[sight.frame];
+  const Eigen::Vector3d in_cam =
+      frame.cam_from_world *
+      (track.one_place ? position : Eigen::Vector3d(position - state.centers[frame.center]));
+  const std::optional<Eigen::Vector2d> pixel = camera.Project(in_cam);
+  return pixel ? (*pixel - sight.observation->keypoint_px).norm() : kInfinity;
+}
+
+// Which observations a position explains, and how well it does over all of them.
+struct Verdict {
+  std::vector<bool> fits;
+  int num_fits = 0;
+  double score = kInfinity;  // sum of squared errors in sigmas, each cut off at the limit
+};
+
+class Classifier {
+ public:
+  // @param max_error_px  zero: whatever projects fits.
+  Classifier(const Camera& camera,
+             const BundleState& state,
+             double max_error_px,
+             const BundleOptions& options)
+      : camera_(camera),
+        state_(state),
+        max_error_px_(max_error_px),
+        min_observations_(options.min_observations),
+        min_angle_rad_(options.min_angle_deg * kRadFromDeg) {}
+
+  // Marks the observations that the track's position, or else a new one, explains.
+  void Classify(TrackState& track) const {
+    bool found = false;
+    Eigen::Vector3d best = Eigen::Vector3d::Zero();
+    Verdict best_verdict;
+    const auto offer = [&](const std::optional<Eigen::Vector3d>& position) {
+      if (!position || !position->allFinite()) return;
+      Verdict verdict = Judge(track, *position);
+      if (found && !(verdict.score < best_verdict.score)) return;
+      found = true;
+      best = *position;
+      best_verdict = std::move(verdict);
+    };
+    const int num_sights = static_cast<int>(track.sights.size());
+    const auto all_fit = [&] { return found && best_verdict.num_fits == num_sights; };
+    if (track.has_position) offer(track.position);
+    if (!all_fit()) offer(Locate(track, std::vector<bool>(num_sights, true)));
+    if (!all_fit() && (max_error_px_ > 0.0 || !found)) {
+      for (const auto& [a, b] : Pairs(num_sights)) {
+        std::vector<bool> chosen(num_sights, false);
+        chosen[a] = chosen[b] = true;
+        offer(Locate(track, chosen));
+        if (all_fit()) break;
+      }
+      if (found && best_verdict.num_fits >= 2) offer(Locate(track, best_verdict.fits));
+    }
+    track.has_position = found;
+    if (found) track.position = best;
+    Accept(track, found ? best_verdict.fits : std::vector<bool>(num_sights, false));
+  }
+
+  // The same with the position as it is.
+  void Recheck(TrackState& track) const {
+    if (track.kind == TrackKind::kOut) return;
+    Accept(track, Judge(track, track.position).fits);
+  }
+
+  // Takes the observations marked in `fits` if together they make a point.
+  void Accept(TrackState& track, const std::vector<bool>& fits) const {
+    int count = 0;
+    for (std::size_t k = 0; k < fits.size(); ++k) {
+      Sight& sight = track.sights[k];
+      sight.used = fits[k] && !state_.frames[sight.frame].weak;
+      count += sight.used ? 1 : 0;
+    }
+    const bool enough = count >= min_observations_ && (track.one_place || IsDeep(track));
+    track.kind = !enough           ? TrackKind::kOut
+                 : track.one_place ? TrackKind::kDirection
+                                   : TrackKind::kPoint;
+    if (enough) return;
+    for (Sight& sight : track.sights) sight.used = false;
+  }
+
+ private:
+  double LimitPx(const Sight& sight) const {
+    if (max_error_px_ == 0.0) return std::numeric_limits<double>::max();
+    return max_error_px_ * std::max(1.0, sight.observation->sigma_px);
+  }
+
+  Verdict Judge(const TrackState& track, const Eigen::Vector3d& position) const {
+    Verdict verdict;
+    verdict.score = 0.0;
+    for (const Sight& sight : track.sights) {
+      const double error_px = ErrorPx(camera_, state_, track, sight, position);
+      const double limit_px = LimitPx(sight);
+      verdict.fits.push_back(error_px <= limit_px);
+      verdict.num_fits += verdict.fits.back() ? 1 : 0;
+      const double sigmas = std::min(error_px, limit_px) / sight.observation->sigma_px;
+      verdict.score += sigmas * sigmas;
+    }
+    return verdict;
+  }
+
+  std::optional<Eigen::Vector3d> Locate(const TrackState& track,
+                                        const std::vector<bool>& chosen) const {
+    if (track.one_place) {
+      Eigen::Vector3d sum = Eigen::Vector3d::Zero();
+      for (std::size_t k = 0; k < chosen.size(); ++k) {
+        if (!chosen[k]) continue;
+        const Observation& observation = *track.sights[k].observation;
+        sum += state_.frames[track.sights[k].frame].cam_from_world.Inverse() * observation.bearing /
+               (observation.sigma_px * observation.sigma_px);
+      }
+      if (!(sum.norm() > 0.0)) return std::nullopt;
+      return sum.normalized();
+    }
+    std::vector<Sighting> sightings;
+    for (std::size_t k = 0; k < chosen.size(); ++k) {
+      if (chosen[k]) {
+        sightings.push_back(AsSighting(state_, track.sights[k], camera_.MeanFocal()));
+      }
+    }
+    if (sightings.size() < 2) return std::nullopt;
+    return Triangulate(sightings, min_angle_rad_);
+  }
+
+  // Pairs of sights, widest apart first.
+  static std::vector<std::pair<int, int>> Pairs(int num_sights) {
+    std::vector<std::pair<int, int>> pairs;
+    for (int gap = num_sights - 1; gap > 0; --gap) {
+      for (int a = 0; a + gap < num_sights; ++a) {
+        pairs.emplace_back(a, a + gap);
+        if (static_cast<int>(pairs.size()) == kMaxTrackHypotheses) return pairs;
+      }
+    }
+    return pairs;
+  }
+
+  // Whether two of the used rays meet at the smallest angle allowed.
+  bool IsDeep(const TrackState& track) const {
+    std::vector<Eigen::Vector3d> rays;
+    for (const Sight& sight : track.sights) {
+      if (!sight.used) continue;
+      rays.push_back(
+          (track.position - state_.centers[state_.frames[sight.frame].center]).normalized());
+    }
+    for (std::size_t b = rays.size(); b-- > 0;) {
+      for (std::size_t a = 0; a < b; ++a) {
+        if (std::atan2(rays[a].cross(rays[b]).norm(), rays[a].dot(rays[b])) >= min_angle_rad_) {
+          return true;
+        }
+      }
+    }
+    return false;
+  }
+
+  const Camera& camera_;
+  const BundleState& state_;
+  double max_error_px_;
+  int min_observations_;
+  double min_angle_rad_;
+};
+
+// Takes frames out that are left with too few observations, then tracks that lose theirs, until
+// nothing changes.
+void RemoveWeakFrames(const Classifier& classifier, int min_observations, BundleState& state) {
+  for (bool changed = true; changed;) {
+    std::vector<int> count(state.frames.size(), 0);
+    for (const TrackState& track : state.tracks) {
+      for (const Sight& sight : track.sights) count[sight.frame] += sight.used ? 1 : 0;
+    }
+    changed = false;
+    for (std::size_t k = 0; k < state.frames.size(); ++k) {
+      FrameState& frame = state.frames[k];
+      if (frame.fixed || frame.weak || count[k] >= min_observations) continue;
+      frame.weak = true;
+      changed = true;
+    }
+    if (!changed) return;
+    for (TrackState& track : state.tracks) {
+      if (track.kind == TrackKind::kOut) continue;
+      std::vector<bool> fits;
+      for (const Sight& sight : track.sights) fits.push_back(sight.used);
+      classifier.Accept(track, fits);
+    }
+  }
+}
+
+}  // namespace
+
+void ClassifyAll(const Camera& camera,
+                 double max_error_px,
+                 bool retriangulate,
+                 const BundleOptions& options,
+                 BundleState& state) {
+  const Classifier classifier(camera, state, max_error_px, options);
+  if (retriangulate) {
+    for (FrameState& frame : state.frames) frame.weak = false;
+  }
+  ParallelFor(static_cast<int>(state.tracks.size()), options.num_threads, [&](int k) {
+    TrackState& track = state.tracks[k];
+    retriangulate ? classifier.Classify(track) : classifier.Recheck(track);
+  });
+  RemoveWeakFrames(classifier, options.min_frame_observations, state);
+}
+
+ResidualStatistics Statistics(const Camera& camera, const BundleState& state) {
+  std::vector<double> errors_px;
+  for (const TrackState& track : state.tracks) {
+    if (track.kind != TrackKind::kPoint) continue;
+    for (const Sight& sight : track.sights) {
+      if (!sight.used) continue;
+      errors_px.push_back(ErrorPx(camera, state, track, sight, track.position));
+    }
+  }
+  ResidualStatistics statistics;
+  statistics.num_observations = static_cast<int>(errors_px.size());
+  if (errors_px.empty()) return statistics;
+  std::sort(errors_px.begin(), errors_px.end());
+  double sum = 0.0;
+  double squares = 0.0;
+  for (const double error_px : errors_px) {
+    sum += error_px;
+    squares += error_px * error_px;
+  }
+  const double count = static_cast<double>(errors_px.size());
+  statistics.mean_px = sum / count;
+  statistics.rms_px = std::sqrt(squares / count);
+  statistics.median_px = errors_px[errors_px.size() / 2];
+  statistics.p90_px = errors_px[errors_px.size() * 9 / 10];
+  return statistics;
+}
+
+}  // namespace rotslam

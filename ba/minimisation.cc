@@ -1,0 +1,227 @@
+#include "ba/minimisation.h"
+
+#include <algorithm>
+#include <deque>
+#include <memory>
+#include <vector>
+
+#include <ceres/loss_function.h>
+#include <ceres/ordered_groups.h>
+#include <ceres/problem.h>
+
+#include "ba/reprojection_cost.h"
+
+namespace rotslam {
+namespace {
+
+// Weight of the scale anchor: a share of 1e-4 of the scale costs as much as one sigma. The optimum
+// does not depend on it.
+constexpr double kScaleAnchorWeight = 1e4;
+// Keeps Levenberg-Marquardt's damping above rounding, for what the data leave open: the length of
+// directions, scale and place of parts that share no track.
+constexpr double kMaxTrustRegionRadius = 1e10;
+
+std::unique_ptr<ceres::LossFunction> MakeLoss(const BundleRound& round) {
+  if (round.loss == "huber") return std::make_unique<ceres::HuberLoss>(round.loss_scale);
+  if (round.loss == "cauchy") return std::make_unique<ceres::CauchyLoss>(round.loss_scale);
+  return nullptr;
+}
+
+// The used observations as a Ceres problem over the state's own numbers.
+class Minimisation {
+ public:
+  Minimisation(const Camera& camera,
+               bool refine_rotations,
+               const BundleRound& round,
+               BundleState& state)
+      : camera_(camera),
+        refine_rotations_(refine_rotations),
+        state_(state),
+        loss_(MakeLoss(round)),
+        problem_(ProblemOptions()),
+        camera_blocks_(3 * state.centers.size() + 4 * state.frames.size()),
+        frame_used_(state.frames.size(), false),
+        center_used_(state.centers.size(), false) {
+    for (std::size_t k = 0; k < state.frames.size(); ++k) {
+      const Eigen::Vector4d q = state.frames[k].cam_from_world.Quaternion().coeffs();
+      std::copy_n(q.data(), 4, QuaternionBlock(k));
+    }
+    for (std::size_t c = 0; c < state.centers.size(); ++c) {
+      std::copy_n(state.centers[c].data(), 3, CenterBlock(c));
+    }
+    ordering_ = std::make_shared<ceres::ParameterBlockOrdering>();
+    AddResiduals();
+    if (!Empty()) FixGauge();
+  }
+
+  bool Empty() const { return counts_.num_points == 0 || !moving_; }
+  // Counts only; costs and times come from Solve.
+  const BundleRoundSummary& Counts() const { return counts_; }
+
+  ceres::Solver::Summary Solve(const BundleRound& round, int max_dense_frames) {
+    ceres::Solver::Options options;
+    options.linear_solver_type =
+        counts_.num_frames <= max_dense_frames ? ceres::DENSE_SCHUR : ceres::SPARSE_SCHUR;
+    options.sparse_linear_algebra_library_type = ceres::SUITE_SPARSE;
+    options.linear_solver_ordering = ordering_;
+    options.num_threads = 1;
+    options.max_num_iterations = round.max_iterations;
+    options.function_tolerance = round.function_tolerance;
+    options.gradient_tolerance = 0.0;
+    options.parameter_tolerance = 1e-12;
+    options.max_trust_region_radius = kMaxTrustRegionRadius;
+    options.logging_type = ceres::SILENT;
+    ceres::Solver::Summary summary;
+    ceres::Solve(options, &problem_, &summary);
+    TakeCameras();
+    return summary;
+  }
+
+ private:
+  static ceres::Problem::Options ProblemOptions() {
+    ceres::Problem::Options options;
+    options.cost_function_ownership = ceres::DO_NOT_TAKE_OWNERSHIP;
+    options.loss_function_ownership = ceres::DO_NOT_TAKE_OWNERSHIP;
+    options.manifold_ownership = ceres::DO_NOT_TAKE_OWNERSHIP;
+    options.disable_all_safety_checks = true;
+    return options;
+  }
+
+  double* CenterBlock(std::size_t center) { return &camera_blocks_[3 * center]; }
+  double* QuaternionBlock(std::size_t frame) {
+    return &camera_blocks_[3 * state_.centers.size() + 4 * frame];
+  }
+
+  void AddResiduals() {
+    for (TrackState& track : state_.tracks) {
+      // With rotations held a direction has nothing to say.
+      if (track.kind == TrackKind::kOut) continue;
+      if (track.kind == TrackKind::kDirection && !refine_rotations_) continue;
+      for (const Sight& sight : track.sights) {
+        if (sight.used) AddObservation(track, sight);
+      }
+      ordering_->AddElementToGroup(track.position.data(), 0);
+      (track.kind == TrackKind::kPoint ? counts_.num_points : counts_.num_directions) += 1;
+    }
+    for (std::size_t k = 0; k < state_.frames.size(); ++k) {
+      if (!frame_used_[k]) continue;
+      ++counts_.num_frames;
+      problem_.SetManifold(QuaternionBlock(k), &manifold_);
+      ordering_->AddElementToGroup(QuaternionBlock(k), 1);
+    }
+    for (std::size_t k = 0; k < state_.centers.size(); ++k) {
+      if (center_used_[k]) ordering_->AddElementToGroup(CenterBlock(k), 1);
+    }
+  }
+
+  void AddObservation(TrackState& track, const Sight& sight) {
+    const FrameState& frame = state_.frames[sight.frame];
+    double* const quaternion = QuaternionBlock(sight.frame);
+    const Observation& observation = *sight.observation;
+    frame_used_[sight.frame] = true;
+    if (!frame.fixed) moving_ = true;
+    ++counts_.num_observations;
+    if (track.kind == TrackKind::kDirection) {
+      directions_.emplace_back(camera_, observation.keypoint_px, observation.sigma_px);
+      problem_.AddResidualBlock(
+          &directions_.back(), loss_.get(), quaternion, track.position.data());
+      return;
+    }
+    center_used_[frame.center] = true;
+    points_.emplace_back(camera_, observation.keypoint_px, observation.sigma_px);
+    problem_.AddResidualBlock(
+        &points_.back(), loss_.get(), quaternion, CenterBlock(frame.center), track.position.data());
+  }
+
+  // Holds fixed frames, or else the first frame that sees points, and the scale where no two held
+  // centres hold it already.
+  void FixGauge() {
+    std::vector<bool> held(state_.centers.size(), false);
+    for (std::size_t k = 0; k < state_.frames.size(); ++k) {
+      const FrameState& frame = state_.frames[k];
+      if (frame.fixed) held[frame.center] = true;
+      if (frame_used_[k] && (frame.fixed || !refine_rotations_)) {
+        problem_.SetParameterBlockConstant(QuaternionBlock(k));
+      }
+    }
+    for (std::size_t c = 0; c < held.size(); ++c) held[c] = held[c] && center_used_[c];
+    int origin = -1;
+    int num_held = 0;
+    for (std::size_t c = 0; c < held.size(); ++c) {
+      if (!held[c]) continue;
+      problem_.SetParameterBlockConstant(CenterBlock(c));
+      if (origin < 0) origin = static_cast<int>(c);
+      ++num_held;
+    }
+    for (std::size_t k = 0; k < state_.frames.size() && origin < 0; ++k) {
+      if (!frame_used_[k] || !center_used_[state_.frames[k].center]) continue;
+      origin = state_.frames[k].center;
+      problem_.SetParameterBlockConstant(CenterBlock(origin));
+      problem_.SetParameterBlockConstant(QuaternionBlock(k));
+    }
+    if (num_held < 2) AnchorScale(origin);
+  }
+
+  void AnchorScale(int origin) {
+    int farthest = -1;
+    double largest = 0.0;
+    for (std::size_t c = 0; c < state_.centers.size(); ++c) {
+      const double distance = (state_.centers[c] - state_.centers[origin]).norm();
+      if (!center_used_[c] || !(distance > largest)) continue;
+      farthest = static_cast<int>(c);
+      largest = distance;
+    }
+    if (farthest < 0) return;
+    anchor_ = std::make_unique<ScaleAnchorCost>(
+        state_.centers[origin], state_.centers[farthest], kScaleAnchorWeight);
+    problem_.AddResidualBlock(anchor_.get(), nullptr, CenterBlock(farthest));
+  }
+
+  // Held rotations keep their last bit.
+  void TakeCameras() {
+    for (std::size_t c = 0; c < state_.centers.size(); ++c) {
+      std::copy_n(CenterBlock(c), 3, state_.centers[c].data());
+    }
+    for (std::size_t k = 0; k < state_.frames.size(); ++k) {
+      if (!frame_used_[k] || problem_.IsParameterBlockConstant(QuaternionBlock(k))) continue;
+      const Eigen::Quaterniond q(QuaternionBlock(k));
+      if (q.coeffs().allFinite()) state_.frames[k].cam_from_world = Rotation(q);
+    }
+  }
+
+  const Camera& camera_;
+  const bool refine_rotations_;
+  BundleState& state_;
+  std::unique_ptr<ceres::LossFunction> loss_;
+  LeftRotationManifold manifold_;
+  std::deque<ReprojectionCost> points_;
+  std::deque<DirectionCost> directions_;
+  std::unique_ptr<ScaleAnchorCost> anchor_;
+  ceres::Problem problem_;
+  // Centres, then quaternions, in one piece of memory: Ceres sorts the blocks of a group by
+  // address, and with it the order of elimination, which must not depend on where an allocation
+  // lands.
+  std::vector<double> camera_blocks_;
+  std::vector<bool> frame_used_;
+  std::vector<bool> center_used_;
+  std::shared_ptr<ceres::ParameterBlockOrdering> ordering_;
+  bool moving_ = false;
+  BundleRoundSummary counts_;
+};
+
+}  // namespace
+
+std::optional<MinimisationResult> Minimise(const Camera& camera,
+                                           const BundleRound& round,
+                                           const BundleOptions& options,
+                                           BundleState& state) {
+  Minimisation minimisation(
+      camera, round.refine_rotations && options.refine_rotations, round, state);
+  if (minimisation.Empty()) return std::nullopt;
+  MinimisationResult result;
+  result.counts = minimisation.Counts();
+  result.solver = minimisation.Solve(round, options.max_dense_frames);
+  return result;
+}
+
+}  // namespace rotslam
