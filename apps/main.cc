@@ -1,5 +1,6 @@
 #include <algorithm>
 #include <cstdio>
+#include <cstdlib>
 #include <exception>
 #include <string>
 
@@ -42,6 +43,8 @@ int main(int argc, char** argv) {
   CLI::App app("rotslam: camera path and sparse map from one calibrated video, rotations first",
                "rotslam");
   app.require_subcommand(1);
+  // FFmpeg writes to stderr by itself what we report in our own words; -8 is its "quiet".
+  setenv("OPENCV_FFMPEG_LOGLEVEL", "-8", 0);
   // Our stages bring their own threads; OpenCV's pool under them only gets in the way.
   cv::setNumThreads(1);
   rotslam::Action action;
