@@ -1,17 +1,9 @@
 #include "apps/pipeline.h"
 
+#include "apps/config.h"
+#include "rotodom/types/options.h"
+
 namespace rotslam {
-namespace {
-
-template <class Options>
-std::optional<std::string> ProblemIn(const char* name, const Options& options) {
-  const std::optional<std::string> problem = options.Problem();
-  if (!problem) return std::nullopt;
-  return std::string(name) + "." + *problem;
-}
-
-}  // namespace
-
 std::optional<std::string> PipelineOptions::Problem() const {
   if (auto problem = ProblemIn("sequence", sequence)) return problem;
   if (auto problem = ProblemIn("rotodom", rotodom)) return problem;
@@ -21,10 +13,17 @@ std::optional<std::string> PipelineOptions::Problem() const {
   if (auto problem = ProblemIn("ba", ba)) return problem;
   if (auto problem = ProblemIn("resection", resection)) return problem;
   if (!(cloud_min_angle_deg >= 0.0)) {
-    return "cloud_min_angle_deg = " + std::to_string(cloud_min_angle_deg) +
-           ": must be zero or more";
+    return OutOfRange("cloud_min_angle_deg", cloud_min_angle_deg, "zero or more");
   }
   return std::nullopt;
+}
+
+PipelineOptions ReadPipelineOptions(const CommonFlags& common, const InputFlags& input) {
+  PipelineOptions options;
+  if (!common.config.empty()) LoadOptionsYaml(common.config, options);
+  input.Override(options.sequence);
+  options.krot.seed = common.seed;
+  return options;
 }
 
 }  // namespace rotslam

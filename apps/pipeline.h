@@ -3,6 +3,8 @@
 #include <optional>
 #include <string>
 
+#include "apps/command.h"
+#include "apps/input.h"
 #include "ba/bundle_adjustment.h"
 #include "ba/resection.h"
 #include "krot/held_stretches.h"
@@ -39,5 +41,8 @@ struct PipelineOptions {
     visit("cloud_min_angle_deg", cloud_min_angle_deg);
   }
 };
+
+/// The defaults, overridden by the configuration file and then by the flags.
+PipelineOptions ReadPipelineOptions(const CommonFlags& common, const InputFlags& input);
 
 }  // namespace rotslam

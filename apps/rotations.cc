@@ -2,7 +2,6 @@
 #include <memory>
 
 #include "apps/command.h"
-#include "apps/config.h"
 #include "apps/orientations.h"
 #include "apps/pipeline.h"
 #include "apps/progress.h"
@@ -20,9 +19,7 @@ int FindAndWriteRotations(const RotationsFlags& flags) {
   const auto start = std::chrono::steady_clock::now();
   Progress progress(flags.common.quiet);
   // The whole pipeline's options, so that one configuration file serves `run` and `rotations`.
-  PipelineOptions options;
-  if (!flags.common.config.empty()) LoadOptionsYaml(flags.common.config, options);
-  flags.input.Override(options.sequence);
+  const PipelineOptions options = ReadPipelineOptions(flags.common, flags.input);
 
   Input input = OpenInput(
       flags.input, options.sequence, [&](const std::string& line) { progress.Say(line); });

@@ -3,7 +3,6 @@
 #include <stdexcept>
 
 #include "apps/command.h"
-#include "apps/config.h"
 #include "apps/orientations.h"
 #include "apps/pipeline.h"
 #include "apps/positions.h"
@@ -29,9 +28,7 @@ double SecondsSince(Clock::time_point start) {
 int Run(const RunFlags& flags) {
   const Clock::time_point start = Clock::now();
   Progress progress(flags.common.quiet);
-  PipelineOptions options;
-  if (!flags.common.config.empty()) LoadOptionsYaml(flags.common.config, options);
-  flags.input.Override(options.sequence);
+  const PipelineOptions options = ReadPipelineOptions(flags.common, flags.input);
 
   Input input = OpenInput(
       flags.input, options.sequence, [&](const std::string& line) { progress.Say(line); });

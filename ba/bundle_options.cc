@@ -1,20 +1,8 @@
 #include "ba/bundle_options.h"
 
-#include <sstream>
+#include "rotodom/types/options.h"
 
 namespace rotslam {
-namespace {
-
-// "name is value, must be limit"; written so that NaN counts as out of range.
-template <class T>
-std::string OutOfRange(const std::string& name, const T& value, const std::string& limit) {
-  std::ostringstream text;
-  text << name << " is " << value << ", must be " << limit;
-  return text.str();
-}
-
-}  // namespace
-
 std::optional<std::string> BundleRound::Problem() const {
   if (!(max_error_px >= 0.0)) return OutOfRange("max_error_px", max_error_px, "at least 0");
   if (loss != "huber" && loss != "cauchy" && loss != "none") {
@@ -29,9 +17,9 @@ std::optional<std::string> BundleRound::Problem() const {
 }
 
 std::optional<std::string> BundleOptions::Problem() const {
-  if (const auto problem = bridge.Problem()) return "bridge." + *problem;
-  if (const auto problem = coarse.Problem()) return "coarse." + *problem;
-  if (const auto problem = fine.Problem()) return "fine." + *problem;
+  if (auto problem = ProblemIn("bridge", bridge)) return problem;
+  if (auto problem = ProblemIn("coarse", coarse)) return problem;
+  if (auto problem = ProblemIn("fine", fine)) return problem;
   if (!bridge.enabled && !coarse.enabled && !fine.enabled) {
     return "fine.enabled is false, must be true for one of bridge, coarse and fine";
   }

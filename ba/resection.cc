@@ -2,12 +2,12 @@
 
 #include <algorithm>
 #include <cmath>
-#include <sstream>
 #include <stdexcept>
 
 #include <Eigen/Dense>
 
 #include "ba/reprojection_cost.h"
+#include "rotodom/types/options.h"
 
 namespace rotslam {
 namespace {
@@ -180,21 +180,14 @@ std::optional<Matrix6d> Covariance(const Matrix6d& H) {
 }  // namespace
 
 std::optional<std::string> ResectionOptions::Problem() const {
-  std::ostringstream text;
   if (!refine_rotation && !refine_center) {
-    text << "refine_center is false, must be true where refine_rotation is false";
-  } else if (!(loss_scale > 0.0)) {
-    text << "loss_scale is " << loss_scale << ", must be positive";
-  } else if (!(max_error_px > 0.0)) {
-    text << "max_error_px is " << max_error_px << ", must be positive";
-  } else if (min_inliers < 3) {
-    text << "min_inliers is " << min_inliers << ", must be at least 3";
-  } else if (max_iterations < 1) {
-    text << "max_iterations is " << max_iterations << ", must be at least 1";
-  } else {
-    return std::nullopt;
+    return OutOfRange("refine_center", "false", "true where refine_rotation is false");
   }
-  return text.str();
+  if (!(loss_scale > 0.0)) return OutOfRange("loss_scale", loss_scale, "positive");
+  if (!(max_error_px > 0.0)) return OutOfRange("max_error_px", max_error_px, "positive");
+  if (min_inliers < 3) return OutOfRange("min_inliers", min_inliers, "at least 3");
+  if (max_iterations < 1) return OutOfRange("max_iterations", max_iterations, "at least 1");
+  return std::nullopt;
 }
 
 std::optional<ResectedPose> ResectFrame(const Camera& camera,

@@ -5,6 +5,8 @@
 #include <utility>
 #include <vector>
 
+#include "rotodom/types/options.h"
+
 namespace rotslam {
 namespace {
 
@@ -64,16 +66,16 @@ void Offer(const MinimaxProblem& problem, MinimaxStructure structure, BisectionR
 
 std::optional<std::string> BisectionOptions::Problem() const {
   if (!(relative_gap > 0.0)) {
-    return "relative_gap is " + std::to_string(relative_gap) + ", must be above 0";
+    return OutOfRange("relative_gap", relative_gap, "above 0");
   }
   if (!(zero_gamma > 0.0)) {
-    return "zero_gamma is " + std::to_string(zero_gamma) + ", must be above 0";
+    return OutOfRange("zero_gamma", zero_gamma, "above 0");
   }
   if (max_programs < 1) {
-    return "max_programs is " + std::to_string(max_programs) + ", must be at least 1";
+    return OutOfRange("max_programs", max_programs, "at least 1");
   }
   if (!(max_extent > 1.0)) {
-    return "max_extent is " + std::to_string(max_extent) + ", must be above 1";
+    return OutOfRange("max_extent", max_extent, "above 1");
   }
   return std::nullopt;
 }

@@ -2,6 +2,8 @@
 
 #include <stdexcept>
 
+#include "rotodom/types/options.h"
+
 namespace rotslam {
 namespace {
 
@@ -25,10 +27,9 @@ struct Evidence {
 
 std::optional<std::string> HeldStretchOptions::Problem() const {
   if (!(min_rotation_only_ratio > 0.0 && min_rotation_only_ratio <= 1.0)) {
-    return "min_rotation_only_ratio = " + std::to_string(min_rotation_only_ratio) +
-           ": must be above 0 and at most 1";
+    return OutOfRange("min_rotation_only_ratio", min_rotation_only_ratio, "above 0 and at most 1");
   }
-  if (min_frames < 2) return "min_frames = " + std::to_string(min_frames) + ": must be at least 2";
+  if (min_frames < 2) return OutOfRange("min_frames", min_frames, "at least 2");
   return std::nullopt;
 }
 

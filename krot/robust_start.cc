@@ -4,6 +4,8 @@
 #include <stdexcept>
 #include <utility>
 
+#include "rotodom/types/options.h"
+
 namespace rotslam {
 namespace {
 
@@ -53,9 +55,9 @@ bool SolveRound(const MinimaxProblem& problem,
 }  // namespace
 
 std::optional<std::string> RobustStartOptions::Problem() const {
-  if (max_rounds < 1) return "max_rounds is " + std::to_string(max_rounds) + ", must be at least 1";
+  if (max_rounds < 1) return OutOfRange("max_rounds", max_rounds, "at least 1");
   if (!(depth_price > 0.0)) {
-    return "depth_price is " + std::to_string(depth_price) + ", must be above 0";
+    return OutOfRange("depth_price", depth_price, "above 0");
   }
   return std::nullopt;
 }

@@ -8,6 +8,7 @@
 
 #include <Eigen/Dense>
 
+#include "rotodom/types/options.h"
 #include "rotodom/types/parallel.h"
 
 namespace rotslam {
@@ -150,9 +151,9 @@ std::optional<SimilarityFit> FitSimilarity(const std::vector<PosePair>& pairs) {
 }  // namespace
 
 std::optional<std::string> MetricsOptions::Problem() const {
-  if (!(max_gap_s >= 0.0)) return "max_gap_s = " + std::to_string(max_gap_s) + ", must be >= 0";
-  if (!(exact_s >= 0.0)) return "exact_s = " + std::to_string(exact_s) + ", must be >= 0";
-  if (num_threads < 1) return "num_threads = " + std::to_string(num_threads) + ", must be >= 1";
+  if (!(max_gap_s >= 0.0)) return OutOfRange("max_gap_s", max_gap_s, "at least 0");
+  if (!(exact_s >= 0.0)) return OutOfRange("exact_s", exact_s, "at least 0");
+  if (num_threads < 1) return OutOfRange("num_threads", num_threads, "at least 1");
   return std::nullopt;
 }
 

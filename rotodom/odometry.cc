@@ -4,18 +4,13 @@
 #include <iterator>
 #include <stdexcept>
 
+#include "rotodom/types/options.h"
+
 namespace rotslam {
 namespace {
 
 // Positions of the same corner that differ by more than this are not averaged.
 constexpr double kSameCornerPx = 1.0;
-
-template <class Options>
-std::optional<std::string> ProblemIn(const char* name, const Options& options) {
-  const std::optional<std::string> problem = options.Problem();
-  if (!problem) return std::nullopt;
-  return std::string(name) + "." + *problem;
-}
 
 // Gives every keypoint of `features` that a connection has located the mean of those positions, so
 // that a track follows one point of the scene instead of the detector's grid.

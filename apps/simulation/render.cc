@@ -4,10 +4,11 @@
 #include <cmath>
 #include <memory>
 #include <numbers>
-#include <sstream>
 #include <stdexcept>
 
 #include <Eigen/Geometry>
+
+#include "rotodom/types/options.h"
 
 namespace rotslam {
 namespace {
@@ -255,21 +256,17 @@ float Normal(std::uint64_t hash) {
 }  // namespace
 
 std::optional<std::string> RenderOptions::Problem() const {
-  const auto range = [](const char* name, double value, const char* limit) {
-    std::ostringstream text;
-    text << name << " is " << value << ", must be " << limit;
-    return text.str();
-  };
   if (!(noise_grey >= 0.0 && noise_grey <= 100.0)) {
-    return range("noise_grey", noise_grey, "in [0, 100]");
+    return OutOfRange("noise_grey", noise_grey, "in [0, 100]");
   }
   if (!(exposure_variation >= 0.0 && exposure_variation < 1.0)) {
-    return range("exposure_variation", exposure_variation, "in [0, 1)");
+    return OutOfRange("exposure_variation", exposure_variation, "in [0, 1)");
   }
-  if (blur_subframes < 1) return range("blur_subframes", blur_subframes, "at least 1");
-  if (!(shutter_s >= 0.0 && shutter_s < 10.0)) return range("shutter_s", shutter_s, "in [0, 10)");
+  if (blur_subframes < 1) return OutOfRange("blur_subframes", blur_subframes, "at least 1");
+  if (!(shutter_s >= 0.0 && shutter_s < 10.0))
+    return OutOfRange("shutter_s", shutter_s, "in [0, 10)");
   if (edge_samples < 1 || edge_samples > 16) {
-    return range("edge_samples", edge_samples, "in [1, 16]");
+    return OutOfRange("edge_samples", edge_samples, "in [1, 16]");
   }
   return std::nullopt;
 }

@@ -5,6 +5,7 @@
 #include <sstream>
 #include <stdexcept>
 
+#include "rotodom/types/options.h"
 #include "rotodom/types/parallel.h"
 
 namespace rotslam {
@@ -78,32 +79,27 @@ const char* Name(SimulationKind kind) {
 }
 
 std::optional<std::string> SimulationOptions::Problem() const {
-  const auto range = [](const char* name, double value, const char* limit) {
-    std::ostringstream text;
-    text << name << " is " << value << ", must be " << limit;
-    return text.str();
-  };
-  if (frames < 0) return range("frames", frames, "at least 0 (0: all the path has)");
+  if (frames < 0) return OutOfRange("frames", frames, "at least 0 (0: all the path has)");
   if (kind == SimulationKind::kGimbal && frames > 0 && frames < 10) {
-    return range("frames", frames, "at least 10 for a gimbal path");
+    return OutOfRange("frames", frames, "at least 10 for a gimbal path");
   }
-  if (first < 0) return range("first", first, "at least 0");
-  if (last >= 0 && last < first) return range("last", last, "not before first");
-  if (!(fps >= 0.0 && fps <= 100000.0)) return range("fps", fps, "in [0, 100000]");
+  if (first < 0) return OutOfRange("first", first, "at least 0");
+  if (last >= 0 && last < first) return OutOfRange("last", last, "not before first");
+  if (!(fps >= 0.0 && fps <= 100000.0)) return OutOfRange("fps", fps, "in [0, 100000]");
   if (!(speed_scale >= 1e-3 && speed_scale <= 1e3)) {
-    return range("speed_scale", speed_scale, "in [0.001, 1000]");
+    return OutOfRange("speed_scale", speed_scale, "in [0.001, 1000]");
   }
-  if (!(std::abs(turn_deg) <= 3600.0)) return range("turn_deg", turn_deg, "within +-3600");
+  if (!(std::abs(turn_deg) <= 3600.0)) return OutOfRange("turn_deg", turn_deg, "within +-3600");
   if (!(std::abs(lever_arm_m) <= 0.4)) {
-    return range("lever_arm_m", lever_arm_m, "within +-0.4, to stay clear of the furniture");
+    return OutOfRange("lever_arm_m", lever_arm_m, "within +-0.4, to stay clear of the furniture");
   }
   if (!poses.empty() && kind != SimulationKind::kStreet) {
     return std::string("poses are for a street only");
   }
   if (distractors < 0 || distractors > 1000) {
-    return range("distractors", distractors, "in [0, 1000]");
+    return OutOfRange("distractors", distractors, "in [0, 1000]");
   }
-  if (!(start_s >= 0.0 && start_s < 4e9)) return range("start_s", start_s, "in [0, 4e9)");
+  if (!(start_s >= 0.0 && start_s < 4e9)) return OutOfRange("start_s", start_s, "in [0, 4e9)");
   if (camera.fx > 0.0) {
     if (const auto problem = camera.Problem()) return "camera: " + *problem;
   }

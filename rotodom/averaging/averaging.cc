@@ -8,6 +8,8 @@
 #include <Eigen/Dense>
 #include <Eigen/SparseCholesky>
 
+#include "rotodom/types/options.h"
+
 namespace rotslam {
 namespace {
 
@@ -117,14 +119,11 @@ class WindowProblem {
 }  // namespace
 
 std::optional<std::string> AveragingOptions::Problem() const {
-  const auto problem = [](const char* name, auto value, const char* limit) {
-    return std::string(name) + " = " + std::to_string(value) + ": must be " + limit;
-  };
-  if (window < 1) return problem("window", window, "at least 1");
-  if (!(edge_floor_deg > 0.0)) return problem("edge_floor_deg", edge_floor_deg, "positive");
-  if (!(loss_sigmas > 0.0)) return problem("loss_sigmas", loss_sigmas, "positive");
-  if (!(min_step_deg > 0.0)) return problem("min_step_deg", min_step_deg, "positive");
-  if (max_iterations < 1) return problem("max_iterations", max_iterations, "at least 1");
+  if (window < 1) return OutOfRange("window", window, "at least 1");
+  if (!(edge_floor_deg > 0.0)) return OutOfRange("edge_floor_deg", edge_floor_deg, "positive");
+  if (!(loss_sigmas > 0.0)) return OutOfRange("loss_sigmas", loss_sigmas, "positive");
+  if (!(min_step_deg > 0.0)) return OutOfRange("min_step_deg", min_step_deg, "positive");
+  if (max_iterations < 1) return OutOfRange("max_iterations", max_iterations, "at least 1");
   return std::nullopt;
 }
 

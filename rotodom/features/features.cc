@@ -7,6 +7,7 @@
 #include <opencv2/features2d.hpp>
 #include <opencv2/imgproc.hpp>
 
+#include "rotodom/types/options.h"
 #include "rotodom/types/parallel.h"
 
 namespace rotslam {
@@ -112,7 +113,7 @@ std::vector<Corner> DetectOnLevel(const cv::Mat& image, int count, const Feature
   return ChooseByTurns(cells, count);
 }
 
-// Features per level, proportional to the level's side length as in ORB.
+// Features per level, proportional to the level's side length as in ORB; they sum to max_features.
 std::vector<int> CountsPerLevel(const FeatureOptions& options) {
   std::vector<double> shares(options.num_levels);
   double sum = 0.0;
@@ -121,8 +122,12 @@ std::vector<int> CountsPerLevel(const FeatureOptions& options) {
     sum += shares[level];
   }
   std::vector<int> counts(options.num_levels);
+  double share = 0.0;  // of this level and those before it
+  int given = 0;
   for (int level = 0; level < options.num_levels; ++level) {
-    counts[level] = static_cast<int>(std::lround(options.max_features * shares[level] / sum));
+    share += shares[level] / sum;
+    counts[level] = static_cast<int>(std::lround(options.max_features * share)) - given;
+    given += counts[level];
   }
   return counts;
 }
@@ -141,17 +146,15 @@ std::array<std::uint8_t, 3> ColourAt(const cv::Mat& image, const cv::Point2f& po
 }  // namespace
 
 std::optional<std::string> FeatureOptions::Problem() const {
-  const auto problem = [](const char* name, auto value, const char* limit) {
-    return std::string(name) + " = " + std::to_string(value) + ": must be " + limit;
-  };
-  if (max_features < 50) return problem("max_features", max_features, "at least 50");
-  if (num_levels < 1 || num_levels > 16) return problem("num_levels", num_levels, "1 to 16");
+  if (max_features < 50) return OutOfRange("max_features", max_features, "at least 50");
+  if (num_levels < 1 || num_levels > 16) return OutOfRange("num_levels", num_levels, "1 to 16");
   if (!(scale_factor > 1.0 && scale_factor <= 2.0)) {
-    return problem("scale_factor", scale_factor, "above 1 and at most 2");
+    return OutOfRange("scale_factor", scale_factor, "above 1 and at most 2");
   }
-  if (min_fast_threshold < 1) return problem("min_fast_threshold", min_fast_threshold, "positive");
+  if (min_fast_threshold < 1)
+    return OutOfRange("min_fast_threshold", min_fast_threshold, "positive");
   if (fast_threshold < min_fast_threshold) {
-    return problem("fast_threshold", fast_threshold, "at least min_fast_threshold");
+    return OutOfRange("fast_threshold", fast_threshold, "at least min_fast_threshold");
   }
   return std::nullopt;
 }

@@ -11,6 +11,8 @@
 
 #include <opencv2/video/tracking.hpp>
 
+#include "rotodom/types/options.h"
+
 namespace rotslam {
 namespace {
 
@@ -158,21 +160,19 @@ void KeepCommonTurn(std::vector<Candidate>& best,
 }  // namespace
 
 std::optional<std::string> MatchingOptions::Problem() const {
-  const auto problem = [](const char* name, auto value, const char* limit) {
-    return std::string(name) + " = " + std::to_string(value) + ": must be " + limit;
-  };
-  if (!(radius_px > 0.0)) return problem("radius_px", radius_px, "positive");
+  if (!(radius_px > 0.0)) return OutOfRange("radius_px", radius_px, "positive");
   if (!(wide_radius_px >= radius_px))
-    return problem("wide_radius_px", wide_radius_px, "at least radius_px");
-  if (min_matches < 0) return problem("min_matches", min_matches, "zero or more");
+    return OutOfRange("wide_radius_px", wide_radius_px, "at least radius_px");
+  if (min_matches < 0) return OutOfRange("min_matches", min_matches, "zero or more");
   if (max_distance < 0 || max_distance > 256)
-    return problem("max_distance", max_distance, "0 to 256");
-  if (!(ratio > 0.0 && ratio <= 1.0)) return problem("ratio", ratio, "above 0 and at most 1");
-  if (max_level_step < 0) return problem("max_level_step", max_level_step, "zero or more");
-  if (patch_px < 5 || patch_px % 2 == 0) return problem("patch_px", patch_px, "odd and at least 5");
-  if (patch_levels < 1) return problem("patch_levels", patch_levels, "at least 1");
+    return OutOfRange("max_distance", max_distance, "0 to 256");
+  if (!(ratio > 0.0 && ratio <= 1.0)) return OutOfRange("ratio", ratio, "above 0 and at most 1");
+  if (max_level_step < 0) return OutOfRange("max_level_step", max_level_step, "zero or more");
+  if (patch_px < 5 || patch_px % 2 == 0)
+    return OutOfRange("patch_px", patch_px, "odd and at least 5");
+  if (patch_levels < 1) return OutOfRange("patch_levels", patch_levels, "at least 1");
   if (!(max_correction_px > 0.0))
-    return problem("max_correction_px", max_correction_px, "positive");
+    return OutOfRange("max_correction_px", max_correction_px, "positive");
   return std::nullopt;
 }
 

@@ -8,6 +8,8 @@
 
 #include <Eigen/Dense>
 
+#include "rotodom/types/options.h"
+
 namespace rotslam {
 namespace {
 
@@ -352,26 +354,21 @@ Eigen::Vector3d WithForwardSign(const std::vector<BearingPair>& pairs,
 }  // namespace
 
 std::optional<std::string> RelativeRotationOptions::Problem() const {
-  if (!(inlier_px > 0.0)) return "inlier_px = " + std::to_string(inlier_px) + ": must be positive";
-  if (!(loss_sigmas > 0.0))
-    return "loss_sigmas = " + std::to_string(loss_sigmas) + ": must be positive";
-  if (!(min_noise_px > 0.0))
-    return "min_noise_px = " + std::to_string(min_noise_px) + ": must be positive";
+  if (!(inlier_px > 0.0)) return OutOfRange("inlier_px", inlier_px, "positive");
+  if (!(loss_sigmas > 0.0)) return OutOfRange("loss_sigmas", loss_sigmas, "positive");
+  if (!(min_noise_px > 0.0)) return OutOfRange("min_noise_px", min_noise_px, "positive");
   if (!(shared_error_px >= 0.0)) {
-    return "shared_error_px = " + std::to_string(shared_error_px) + ": must be zero or more";
+    return OutOfRange("shared_error_px", shared_error_px, "zero or more");
   }
-  if (sample_size < 5)
-    return "sample_size = " + std::to_string(sample_size) + ": must be at least 5";
+  if (sample_size < 5) return OutOfRange("sample_size", sample_size, "at least 5");
   if (!(confidence > 0.0 && confidence < 1.0)) {
     return "confidence = " + std::to_string(confidence) + ": must lie between 0 and 1";
   }
-  if (max_samples < 1)
-    return "max_samples = " + std::to_string(max_samples) + ": must be at least 1";
+  if (max_samples < 1) return OutOfRange("max_samples", max_samples, "at least 1");
   if (refine_iterations < 1) {
-    return "refine_iterations = " + std::to_string(refine_iterations) + ": must be at least 1";
+    return OutOfRange("refine_iterations", refine_iterations, "at least 1");
   }
-  if (min_inliers < 6)
-    return "min_inliers = " + std::to_string(min_inliers) + ": must be at least 6";
+  if (min_inliers < 6) return OutOfRange("min_inliers", min_inliers, "at least 6");
   return std::nullopt;
 }
 

@@ -5,6 +5,8 @@
 #include <map>
 #include <stdexcept>
 
+#include "rotodom/types/options.h"
+
 namespace rotslam {
 namespace {
 
@@ -52,11 +54,10 @@ Overlap Compare(const std::vector<Ray>& keyframe, const std::vector<Ray>& frame)
 
 std::optional<std::string> KeyframeOptions::Problem() const {
   if (!(min_parallax_deg > 0.0)) {
-    return "min_parallax_deg = " + std::to_string(min_parallax_deg) + ": must be positive";
+    return OutOfRange("min_parallax_deg", min_parallax_deg, "positive");
   }
   if (!(min_shared_ratio >= 0.0 && min_shared_ratio < 1.0)) {
-    return "min_shared_ratio = " + std::to_string(min_shared_ratio) +
-           ": must be 0 or more and below 1";
+    return OutOfRange("min_shared_ratio", min_shared_ratio, "0 or more and below 1");
   }
   return std::nullopt;
 }

@@ -62,7 +62,12 @@ std::vector<Track> BuildTracks(const std::vector<EdgeMatches>& edges,
     if (!first_node.contains(edge.frame_i) || !first_node.contains(edge.frame_j)) {
       throw std::invalid_argument("BuildTracks: an edge names a frame without features");
     }
+    const int num_i = features.at(edge.frame_i).size();
+    const int num_j = features.at(edge.frame_j).size();
     for (const auto& [i, j] : edge.pairs) {
+      if (i < 0 || i >= num_i || j < 0 || j >= num_j) {
+        throw std::invalid_argument("BuildTracks: an edge names a keypoint that its frame lacks");
+      }
       sets.Join(first_node.at(edge.frame_i) + i, first_node.at(edge.frame_j) + j);
     }
   }

@@ -1,5 +1,6 @@
 #include "rotodom/view_graph/connect.h"
 
+#include "rotodom/types/options.h"
 #include "rotodom/types/parallel.h"
 
 namespace rotslam {
@@ -55,10 +56,9 @@ std::optional<Connection> Connect(const View& view_i,
 }  // namespace
 
 std::optional<std::string> ViewGraphOptions::Problem() const {
-  if (window_frames < 1)
-    return "window_frames = " + std::to_string(window_frames) + ": must be at least 1";
+  if (window_frames < 1) return OutOfRange("window_frames", window_frames, "at least 1");
   if (min_edge_inliers < 0) {
-    return "min_edge_inliers = " + std::to_string(min_edge_inliers) + ": must be zero or more";
+    return OutOfRange("min_edge_inliers", min_edge_inliers, "zero or more");
   }
   return std::nullopt;
 }

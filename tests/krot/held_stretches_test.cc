@@ -1,0 +1,165 @@
+#include "krot/held_stretches.h"
+
+#include <stdexcept>
+
+#include <gtest/gtest.h>
+
+namespace rotslam {
+namespace {
+
+struct Path {
+  ViewGraph graph;
+  RotationMap cam_from_world;
+};
+
+// Frames first_frame, first_frame + stride, ...; `place[k]` says where the k-th stands. An edge
+// shows a baseline when its ends stand further apart than `visible`.
+Path MakePath(const std::vector<double>& place,
+              int reach = 4,
+              double visible = 0.5,
+              int first_frame = 0,
+              int stride = 1) {
+  Path path;
+  const auto frame = [&](int k) { return FrameId{first_frame + stride * k}; };
+  for (int k = 0; k < static_cast<int>(place.size()); ++k) {
+    path.cam_from_world[frame(k)] = Rotation::Exp({0.0, 0.02 * k, 0.0});
+    for (int before = std::max(0, k - reach); before < k; ++before) {
+      RelativeRotation edge{
+          frame(before), frame(k), Rotation::Exp({0.0, 0.02 * (k - before), 0.0})};
+      edge.rotation_only = std::abs(place[k] - place[before]) <= visible;
+      path.graph.AddEdge(edge);
+    }
+  }
+  return path;
+}
+
+// Walks `before` steps, stands for `standing` more, walks `after` steps.
+std::vector<double> WalkStopWalk(int before, int standing, int after, double step = 1.0) {
+  std::vector<double> place = {0.0};
+  for (int k = 0; k < before; ++k) place.push_back(place.back() + step);
+  for (int k = 0; k < standing; ++k) place.push_back(place.back());
+  for (int k = 0; k < after; ++k) place.push_back(place.back() + step);
+  return place;
+}
+
+std::vector<HeldStretch> Find(const Path& path, const HeldStretchOptions& options = {}) {
+  return FindHeldStretches(path.graph, path.cam_from_world, options);
+}
+
+TEST(FindHeldStretches, FindsTheTurnInPlace) {
+  const auto stretches = Find(MakePath(WalkStopWalk(10, 15, 10)));
+  ASSERT_EQ(stretches.size(), 1u);
+  // The edges that reach over an end of the turn show a baseline, so it may lose a reach at most.
+  EXPECT_GE(stretches[0].first, FrameId{10});
+  EXPECT_LE(stretches[0].first, FrameId{13});
+  EXPECT_LE(stretches[0].last, FrameId{25});
+  EXPECT_GE(stretches[0].last, FrameId{22});
+  EXPECT_GE(stretches[0].evidence, 0.5);
+  EXPECT_LE(stretches[0].evidence, 1.0);
+}
+
+TEST(FindHeldStretches, NeverHoldsAStepOfAWalk) {
+  for (const int standing : {0, 8, 12, 20}) {
+    for (const HeldStretch& stretch : Find(MakePath(WalkStopWalk(10, standing, 10)))) {
+      EXPECT_GE(stretch.first, FrameId{10}) << standing;
+      EXPECT_LE(stretch.last, FrameId{10 + standing}) << standing;
+    }
+  }
+}
+
+TEST(FindHeldStretches, TheWholeSequenceMayBeHeld) {
+  const auto stretches = Find(MakePath(std::vector<double>(20, 3.0)));
+  ASSERT_EQ(stretches.size(), 1u);
+  EXPECT_EQ(stretches[0].first, FrameId{0});
+  EXPECT_EQ(stretches[0].last, FrameId{19});
+  EXPECT_EQ(stretches[0].evidence, 1.0);
+}
+
+TEST(FindHeldStretches, ASlowCameraShowsInTheLongestEdges) {
+  // Neighbours stand too near to one another for a baseline to show, the ends of the longest edges
+  // do not.
+  EXPECT_TRUE(Find(MakePath(WalkStopWalk(30, 0, 0, 0.2))).empty());
+}
+
+TEST(FindHeldStretches, IgnoresShortRuns) {
+  HeldStretchOptions options;
+  const Path path = MakePath(std::vector<double>(8, 0.0));
+  EXPECT_EQ(Find(path, options).size(), 1u);  // eight frames, seven steps
+  options.min_frames = 9;
+  EXPECT_TRUE(Find(path, options).empty());
+}
+
+TEST(FindHeldStretches, TwoStopsAreTwoStretches) {
+  std::vector<double> place = WalkStopWalk(5, 20, 10);
+  for (const double more : WalkStopWalk(0, 20, 5)) place.push_back(place[35] + more);
+  const auto stretches = Find(MakePath(place));
+  ASSERT_EQ(stretches.size(), 2u);
+  EXPECT_LT(stretches[0].last, stretches[1].first);
+}
+
+TEST(FindHeldStretches, SwitchedOffFindsNone) {
+  HeldStretchOptions options;
+  options.enabled = false;
+  EXPECT_TRUE(Find(MakePath(std::vector<double>(20, 3.0)), options).empty());
+}
+
+TEST(FindHeldStretches, EvidenceIsTheMeanShareOfTheLongestEdges) {
+  // Ten frames in place with edges of span two; two of the eight contradict.
+  Path path = MakePath(std::vector<double>(10, 0.0), 2);
+  for (const int first : {3, 6}) {
+    RelativeRotation edge = *path.graph.FindEdge(FrameId{first}, FrameId{first + 2});
+    edge.rotation_only = false;
+    path.graph.AddEdge(edge);
+  }
+  const auto stretches = Find(path);
+  ASSERT_EQ(stretches.size(), 1u);
+  EXPECT_EQ(stretches[0].first, FrameId{0});
+  EXPECT_EQ(stretches[0].last, FrameId{9});
+  // Each of the two lies across two steps and makes one half of each: 5 of 9 steps are certain.
+  EXPECT_NEAR(stretches[0].evidence, (5.0 + 4 * 0.5) / 9.0, 1e-12);
+  HeldStretchOptions strict;
+  strict.min_rotation_only_ratio = 0.9;
+  strict.min_frames = 2;
+  for (const HeldStretch& stretch : Find(path, strict)) EXPECT_EQ(stretch.evidence, 1.0);
+}
+
+TEST(FindHeldStretches, AStepWithoutEdgesIsNotHeld) {
+  Path path = MakePath(std::vector<double>(30, 0.0));
+  ViewGraph cut;
+  for (const RelativeRotation& edge : path.graph.edges()) {
+    if ((edge.i.value < 15) == (edge.j.value < 15)) cut.AddEdge(edge);
+  }
+  path.graph = cut;
+  const auto stretches = Find(path);
+  ASSERT_EQ(stretches.size(), 2u);
+  EXPECT_EQ(stretches[0].last, FrameId{14});
+  EXPECT_EQ(stretches[1].first, FrameId{15});
+}
+
+TEST(FindHeldStretches, FrameNumbersMayHaveGaps) {
+  const auto dense = Find(MakePath(WalkStopWalk(10, 15, 10)));
+  const auto sparse = Find(MakePath(WalkStopWalk(10, 15, 10), 4, 0.5, 100, 5));
+  ASSERT_EQ(dense.size(), 1u);
+  ASSERT_EQ(sparse.size(), 1u);
+  EXPECT_EQ(sparse[0].first.value, 100 + 5 * dense[0].first.value);
+  EXPECT_EQ(sparse[0].last.value, 100 + 5 * dense[0].last.value);
+  EXPECT_EQ(sparse[0].evidence, dense[0].evidence);
+}
+
+TEST(FindHeldStretches, NothingGivesNothing) {
+  EXPECT_TRUE(FindHeldStretches({}, {}, {}).empty());
+  EXPECT_TRUE(FindHeldStretches({}, {{FrameId{0}, Rotation()}}, {}).empty());
+}
+
+TEST(HeldStretchOptions, NamesTheFirstFieldOutOfRange) {
+  EXPECT_FALSE(HeldStretchOptions{}.Problem());
+  HeldStretchOptions options;
+  options.min_frames = 1;
+  EXPECT_EQ(options.Problem(), "min_frames = 1: must be at least 2");
+  options.min_rotation_only_ratio = 0.0;
+  EXPECT_TRUE(options.Problem().value_or("none").starts_with("min_rotation_only_ratio = 0"));
+  EXPECT_THROW(FindHeldStretches({}, {}, options), std::invalid_argument);
+}
+
+}  // namespace
+}  // namespace rotslam
