@@ -152,7 +152,7 @@ TEST_F(BadInput, Configurations) {
   EXPECT_THAT(refusal("rotodom:\n  features:\n    max_features: many\n"),
               AllOf(HasSubstr("options.yaml:3: "), HasSubstr("whole number")));
   EXPECT_THAT(refusal("sequence: {stride: 0}\n"), HasSubstr("stride is 0"));
-  EXPECT_THAT(refusal("rotodom: {features: {max_features: 1}}\n"), HasSubstr("max_features = 1"));
+  EXPECT_THAT(refusal("rotodom: {features: {max_features: 1}}\n"), HasSubstr("max_features is 1"));
   EXPECT_THAT(refusal("a: [\n"), HasSubstr("not YAML"));
   EXPECT_THAT(Refusal(Run(Good(), {"--config", "/nowhere.yaml"})), HasSubstr("/nowhere.yaml: "));
   EXPECT_THAT(Refusal(Run(Good(), {"--config", Good().string()})), HasSubstr("is a folder"));
@@ -220,6 +220,48 @@ TEST_F(BadInput, ProgressIsPlainLinesOnStandardError) {
   const CommandResult quiet = Run(Good());
   EXPECT_EQ(quiet.exit_code, 0);
   EXPECT_EQ(quiet.output + quiet.error, "");
+}
+
+TEST_F(BadInput, TheLineOnATerminalIsRenewedAndTakenAway) {
+  const CommandResult result =
+      RotslamOnTerminal({"run", Good().string(), "--out=" + Out().string()}, 40);
+  EXPECT_EQ(result.exit_code, 0);
+  EXPECT_THAT(result.output, HasSubstr("\r\033[Korientations  "));
+  EXPECT_THAT(result.output, HasSubstr("/24  "));
+  EXPECT_THAT(result.output, HasSubstr("ETA 0:0"));
+  for (std::size_t at = 0; (at = result.output.find("\033[K", at)) != std::string::npos;) {
+    at += 3;
+    // No renewed line is as wide as the terminal: what has wrapped cannot be taken away.
+    const std::size_t end = result.output.find_first_of("\r\n", at);
+    if (end == std::string::npos) break;
+    const bool is_renewed = result.output.compare(end, 4, "\r\033[K") == 0;
+    if (is_renewed) {
+      EXPECT_LT(end - at, 40u);
+    }
+  }
+  const std::vector<std::string> shown = ShownLines(result.output);
+  EXPECT_THAT(shown, Each(Not(HasSubstr("ETA"))));
+  EXPECT_THAT(shown, Contains(StartsWith("orientations: 24 frames")));
+  EXPECT_THAT(shown.back(), StartsWith("wrote "));
+  const CommandResult quiet =
+      RotslamOnTerminal({"run", Good().string(), "--out=" + Out().string(), "--quiet"}, 80);
+  EXPECT_EQ(quiet.output, "");
+}
+
+TEST_F(BadInput, AnErrorOnATerminalHasALineOfItsOwn) {
+  for (int k = 0; k < 20; ++k) {
+    const std::string file = (folder_.path() / (std::to_string(k) + ".png")).string();
+    ASSERT_TRUE(cv::imwrite(file, cv::Mat(960, 1280, CV_8UC1, cv::Scalar::all(0))));
+  }
+  folder_.Write("camera.yaml", "model: pinhole\nfx: 900\nfy: 900\ncx: 640\ncy: 480\n");
+  const CommandResult result =
+      RotslamOnTerminal({"run", folder_.path().string(), "--out=" + Out().string()}, 80);
+  EXPECT_EQ(result.exit_code, 1);
+  EXPECT_THAT(result.output, HasSubstr("\r\033[Korientations  "));
+  EXPECT_THAT(ShownLines(result.output),
+              ElementsAre(StartsWith("input: "),
+                          StartsWith("camera: "),
+                          StartsWith("rotslam: no two of the 20 frames")));
 }
 
 }  // namespace
