@@ -107,7 +107,7 @@ TEST_F(RunVariants, SameBytesEveryTimeAndAtAnyNumberOfThreads) {
   }
 }
 
-TEST_F(RunVariants, AnotherSeedIsAnotherRunAndAsGood) {
+TEST_F(RunVariants, AnotherSeedIsAsGood) {
   const fs::path sequence = Simulate({"--width=320", "--height=240"});
   ExpectGood(sequence, Run(sequence, "out", {"--seed=77"}));
 }
