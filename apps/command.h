@@ -24,6 +24,10 @@ struct CommonFlags {
 /// contract errors leave it as exceptions, which main turns into one line.
 using Action = std::function<int()>;
 
+/// Checks of option values, with messages for people.
+CLI::Validator AtLeastZero();
+CLI::Validator AboveZero();
+
 void AddCommonFlags(CLI::App& command, CommonFlags& flags);
 
 // One file per subcommand. Each adds its subcommand to `app` and sets `action` once it is parsed.

@@ -7,6 +7,7 @@
 #include <set>
 #include <string_view>
 #include <type_traits>
+#include <utility>
 
 #include <yaml-cpp/yaml.h>
 
@@ -60,7 +61,9 @@ struct Vocabulary {
     candidates.insert(candidates.end(), groups.begin(), groups.end());
     const auto nearest = std::min_element(
         candidates.begin(), candidates.end(), [&](const std::string& a, const std::string& b) {
-          return KeyDistance(key, a) < KeyDistance(key, b);
+          // Among equally near names, the one in the most similar group.
+          return std::pair(KeyDistance(key, a), EditDistance(key, a)) <
+                 std::pair(KeyDistance(key, b), EditDistance(key, b));
         });
     return nearest == candidates.end() ? std::string() : *nearest;
   }
@@ -150,6 +153,10 @@ class Loader {
 };
 
 YAML::Node ReadYaml(const std::filesystem::path& path) {
+  std::error_code ignored;
+  if (std::filesystem::is_directory(path, ignored)) {
+    throw std::runtime_error(path.string() + ": is a folder, not an options file");
+  }
   try {
     return YAML::LoadFile(path.string());
   } catch (const YAML::BadFile&) {

@@ -121,12 +121,12 @@ void AddEvalCommand(CLI::App& app, Action& action) {
       "--times", flags->times, "Timestamps of KITTI files, one a line (default: the pose number)");
   command
       ->add_option("--images", flags->num_images, "Images of the sequence, to report the coverage")
-      ->check(CLI::NonNegativeNumber);
+      ->check(AtLeastZero());
   command
       ->add_option("--max-gap",
                    flags->max_gap_s,
                    "Largest gap in the ground truth to interpolate over, s (default: 0.2)")
-      ->check(CLI::NonNegativeNumber);
+      ->check(AtLeastZero());
   command->add_flag("--json", flags->json, "Print one line of JSON");
   AddCommonFlags(*command, flags->common);
   command->callback([flags, &action] { action = [flags] { return Eval(*flags); }; });

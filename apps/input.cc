@@ -46,7 +46,12 @@ Input OpenInput(const InputFlags& flags,
     throw std::runtime_error(flags.sequence +
                              ": no calibration lies with the images; give one with --camera FILE");
   }
-  input.camera = MatchToImages(ReadCamera(input.camera_file), input.sequence->image_size());
+  const Camera camera = ReadCamera(input.camera_file);
+  try {
+    input.camera = MatchToImages(camera, input.sequence->image_size());
+  } catch (const std::runtime_error& error) {
+    throw std::runtime_error(input.camera_file + ": " + error.what());
+  }
   tell("camera: " + Describe(input.camera) + " (" + input.camera_file + ")");
   if (input.sequence->NumFrames() >= 0 && input.sequence->NumFrames() < 3) {
     throw std::runtime_error(flags.sequence + ": " + std::to_string(input.sequence->NumFrames()) +

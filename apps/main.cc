@@ -1,15 +1,51 @@
+#include <algorithm>
 #include <cstdio>
+#include <cstdlib>
 #include <exception>
+#include <string>
 
 #include <opencv2/core/utility.hpp>
 
 #include "apps/command.h"
+
+namespace rotslam {
+namespace {
+
+// Messages of other libraries may have several lines; ours have one.
+void PrintError(std::string message) {
+  while (!message.empty() && message.back() == '\n') message.pop_back();
+  std::replace(message.begin(), message.end(), '\n', ' ');
+  std::fprintf(stderr, "rotslam: %s\n", message.c_str());
+}
+
+// The line is not one of ours: says what is wrong with it and where to read what it may be.
+int RefuseCommandLine(const CLI::App& app, const CLI::ParseError& error, int argc, char** argv) {
+  const auto chosen = app.get_subcommands();
+  if (!chosen.empty()) {
+    const std::string name = chosen.front()->get_name();
+    PrintError(name + ": " + error.what() + "; see rotslam " + name + " --help");
+  } else if (argc > 1 && argv[1][0] != '-') {
+    std::string names;
+    for (const CLI::App* command : app.get_subcommands(nullptr)) {
+      names += (names.empty() ? "" : ", ") + command->get_name();
+    }
+    PrintError(std::string("no command is called ") + argv[1] + "; there are " + names);
+  } else {
+    PrintError(std::string(error.what()) + "; see rotslam --help");
+  }
+  return 2;
+}
+
+}  // namespace
+}  // namespace rotslam
 
 int main(int argc, char** argv) {
   try {
     CLI::App app("rotslam: camera path and sparse map from one calibrated video, rotations first",
                  "rotslam");
     app.require_subcommand(1);
+    // FFmpeg writes to stderr by itself what we report in our own words; -8 is its "quiet".
+    setenv("OPENCV_FFMPEG_LOGLEVEL", "-8", 0);
     // Our stages bring their own threads; OpenCV's pool under them only gets in the way.
     cv::setNumThreads(1);
     rotslam::Action action;
@@ -17,10 +53,16 @@ int main(int argc, char** argv) {
     rotslam::AddRotationsCommand(app, action);
     rotslam::AddEvalCommand(app, action);
     rotslam::AddSimulateCommand(app, action);
-    CLI11_PARSE(app, argc, argv);
+    try {
+      app.parse(argc, argv);
+    } catch (const CLI::Success& help) {
+      return app.exit(help);
+    } catch (const CLI::ParseError& error) {
+      return rotslam::RefuseCommandLine(app, error, argc, argv);
+    }
     return action();
   } catch (const std::exception& error) {
-    std::fprintf(stderr, "rotslam: %s\n", error.what());
+    rotslam::PrintError(error.what());
     return 1;
   }
 }

@@ -5,12 +5,9 @@
 #include <stdexcept>
 
 namespace rotslam {
-namespace {
 
-// Orientations of frames without edges, from their neighbours in time that have some.
-void InterpolateUnconnected(Orientations& orientations) {
+void InterpolateUnconnected(const Orientations& orientations, RotationMap& rotations) {
   const auto connected = [&](FrameId frame) { return !orientations.graph.EdgesOf(frame).empty(); };
-  RotationMap& rotations = orientations.cam_from_world;
   for (auto entry = rotations.begin(); entry != rotations.end(); ++entry) {
     if (connected(entry->first)) continue;
     auto before = entry;
@@ -30,6 +27,8 @@ void InterpolateUnconnected(Orientations& orientations) {
     }
   }
 }
+
+namespace {
 
 std::vector<FrameId> FindBreaks(const ViewGraph& graph, const RotationMap& rotations) {
   std::vector<FrameId> breaks;
@@ -82,13 +81,15 @@ Orientations FindOrientations(Input& input,
   for (const auto& [frame, rotation] : orientations.cam_from_world) {
     orientations.num_predicted += orientations.graph.EdgesOf(frame).empty();
   }
-  InterpolateUnconnected(orientations);
+  InterpolateUnconnected(orientations, orientations.cam_from_world);
   orientations.breaks = FindBreaks(orientations.graph, orientations.cam_from_world);
   progress.EndStage(std::to_string(num_frames) + " frames, " +
                     std::to_string(orientations.graph.edges().size()) + " edges");
-  if (orientations.num_predicted > 0) {
-    progress.Warn(std::to_string(orientations.num_predicted) +
-                  " frames match no other; their orientations are interpolated");
+  // The unreadable ones have had their warning.
+  if (const int count = orientations.num_predicted - orientations.num_unreadable; count > 0) {
+    progress.Warn(std::to_string(count) +
+                  (count == 1 ? " frame matches no other; its orientation is interpolated"
+                              : " frames match no other; their orientations are interpolated"));
   }
   for (const FrameId frame : orientations.breaks) {
     progress.Warn("frame " + std::to_string(frame.value) +

@@ -28,6 +28,10 @@ Orientations FindOrientations(Input& input,
                               const CommonFlags& flags,
                               Progress& progress);
 
+/// Gives the frames without an edge the orientation between those of the nearest frames in time
+/// that have one; again once these have been refined.
+void InterpolateUnconnected(const Orientations& orientations, RotationMap& cam_from_world);
+
 /// Camera->world poses from orientations alone, positions zero.
 Trajectory RotationTrajectory(const Orientations& orientations);
 

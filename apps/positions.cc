@@ -336,6 +336,8 @@ PositionResult FindPositions(const Orientations& orientations,
   progress.StartStage("frames between keyframes", -1);
   PlaceRemainingFrames(
       all_tracks, orientations.timestamps_s, camera, options.resection, num_threads, result);
+  // Their neighbours have moved a little since.
+  InterpolateUnconnected(orientations, result.cam_from_world);
   progress.EndStage(std::to_string(result.num_resected) + " resected, " +
                     std::to_string(result.num_interpolated) + " interpolated");
 

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cstdio>
 
+#include <sys/ioctl.h>
 #include <unistd.h>
 
 namespace rotslam {
@@ -36,6 +37,7 @@ void Progress::StartStage(const std::string& name, int total) {
   total_ = total;
   done_ = 0;
   started_ = shown_ = Clock::now();
+  if (terminal_ && !quiet_) Renew(stage_ + " ...");
 }
 
 void Progress::Step(int done, const std::string& note) {
@@ -77,7 +79,11 @@ std::string Progress::Figures(int done) const {
 }
 
 void Progress::Renew(const std::string& line) {
-  std::fprintf(stderr, "\r\033[K%s", line.c_str());
+  // A line that wraps could not be taken back.
+  winsize window{};
+  const bool is_known = ioctl(STDERR_FILENO, TIOCGWINSZ, &window) == 0 && window.ws_col > 1;
+  const int width = is_known ? window.ws_col - 1 : 79;
+  std::fprintf(stderr, "\r\033[K%.*s", width, line.c_str());
   std::fflush(stderr);
   line_open_ = true;
 }

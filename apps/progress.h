@@ -10,6 +10,10 @@ namespace rotslam {
 class Progress {
  public:
   explicit Progress(bool quiet);
+  /// Takes the renewed line away, so that an error's own line stands alone.
+  ~Progress() { ClearLine(); }
+  Progress(const Progress&) = delete;
+  Progress& operator=(const Progress&) = delete;
 
   /// A line that stays.
   void Say(const std::string& line);

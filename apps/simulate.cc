@@ -129,10 +129,10 @@ void AddSimulateCommand(CLI::App& app, Action& action) {
       ->excludes(camera)
       ->capture_default_str();
   command->add_option("--fx", flags->fx, "Focal length in pixels, instead of --hfov-deg")
-      ->check(CLI::PositiveNumber)
+      ->check(AboveZero())
       ->excludes(camera);
   command->add_option("--fy", flags->fy, "Vertical focal length; default: fx")
-      ->check(CLI::PositiveNumber)
+      ->check(AboveZero())
       ->excludes(camera);
   command->add_option("--cx", flags->cx, "Principal point; default: the middle")->excludes(camera);
   command->add_option("--cy", flags->cy, "Principal point; default: the middle")->excludes(camera);

@@ -1,6 +1,7 @@
 #include "rotodom/sequence/sequence.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <cstdint>
 #include <fstream>
@@ -52,6 +53,47 @@ bool IsCutOffJpeg(const std::vector<unsigned char>& bytes) {
   return std::search(scan, bytes.end(), std::begin(kEnd), std::end(kEnd)) == bytes.end();
 }
 
+// CRC-32 of PNG, gzip and Ethernet, bit by bit through a table.
+std::uint32_t Crc32(const unsigned char* begin, const unsigned char* end) {
+  static const std::array<std::uint32_t, 256> table = [] {
+    std::array<std::uint32_t, 256> entries;
+    for (std::uint32_t byte = 0; byte < 256; ++byte) {
+      std::uint32_t value = byte;
+      for (int bit = 0; bit < 8; ++bit) value = (value >> 1) ^ ((value & 1) != 0 ? 0xedb88320 : 0);
+      entries[byte] = value;
+    }
+    return entries;
+  }();
+  std::uint32_t crc = 0xffffffff;
+  for (; begin != end; ++begin) crc = (crc >> 8) ^ table[(crc ^ *begin) & 0xff];
+  return ~crc;
+}
+
+// What is wrong with the chunks of a PNG file; empty when nothing is, or when it is no PNG file.
+// The decoder takes damaged pixels for good ones, and complains on stderr by itself.
+std::string DamageOfPng(const std::vector<unsigned char>& bytes) {
+  constexpr unsigned char kSignature[] = {0x89, 'P', 'N', 'G', '\r', '\n', 0x1a, '\n'};
+  constexpr unsigned char kEnd[] = {'I', 'E', 'N', 'D'};
+  if (bytes.size() < 8 || !std::equal(kSignature, kSignature + 8, bytes.begin())) return {};
+  const auto number_at = [&](std::size_t at) {
+    return std::uint32_t{bytes[at]} << 24 | std::uint32_t{bytes[at + 1]} << 16 |
+           std::uint32_t{bytes[at + 2]} << 8 | std::uint32_t{bytes[at + 3]};
+  };
+  // A chunk is its length, type, that many bytes, and the CRC of type and bytes.
+  for (std::size_t at = 8; at + 12 <= bytes.size();) {
+    const std::size_t length = number_at(at);
+    if (length > bytes.size() - at - 12) break;
+    const unsigned char* type = bytes.data() + at + 4;
+    const bool is_critical = (type[0] & 0x20) == 0;
+    if (is_critical && Crc32(type, type + 4 + length) != number_at(at + 8 + length)) {
+      return "PNG data are damaged (checksum)";
+    }
+    if (std::equal(kEnd, kEnd + 4, type)) return {};
+    at += 12 + length;
+  }
+  return "PNG data are cut off";
+}
+
 cv::Mat DecodeImage(const fs::path& file, std::string& problem) {
   std::ifstream stream(file, std::ios::binary);
   const std::vector<unsigned char> bytes{std::istreambuf_iterator<char>(stream), {}};
@@ -67,6 +109,8 @@ cv::Mat DecodeImage(const fs::path& file, std::string& problem) {
     problem = "JPEG data are cut off";
     return {};
   }
+  problem = DamageOfPng(bytes);
+  if (!problem.empty()) return {};
   cv::Mat image;
   try {
     image = cv::imdecode(bytes,

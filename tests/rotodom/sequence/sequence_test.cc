@@ -162,6 +162,31 @@ TEST_F(SequenceTest, NoticesCutOffFiles) {
   }
 }
 
+TEST_F(SequenceTest, NoticesDamagedPngFiles) {
+  cv::Mat noise(60, 80, CV_8UC1);
+  cv::theRNG().state = 7;
+  cv::randu(noise, 0, 255);
+  std::vector<unsigned char> bytes;
+  ASSERT_TRUE(cv::imencode(".png", noise, bytes));
+  const auto write = [&](const std::string& name) {
+    WriteText(name, std::string(bytes.begin(), bytes.end()));
+  };
+  write("0.png");
+  bytes[bytes.size() / 2] ^= 0x10;
+  write("1.png");
+  bytes[bytes.size() / 2] ^= 0x10;
+  bytes.resize(bytes.size() - 12);  // the end chunk
+  write("2.png");
+  const auto sequence = OpenSequence(folder_, {});
+  testing::internal::CaptureStderr();
+  const std::vector<Frame> frames = ReadAll(*sequence);
+  EXPECT_EQ(testing::internal::GetCapturedStderr(), "");  // the decoder has not been asked
+  ASSERT_EQ(frames.size(), 3u);
+  EXPECT_EQ(frames[0].problem, "");
+  EXPECT_EQ(frames[1].problem, "PNG data are damaged (checksum)");
+  EXPECT_EQ(frames[2].problem, "PNG data are cut off");
+}
+
 TEST_F(SequenceTest, MissingFilesOfAListAreUnreadableFrames) {
   WriteText("rgb.txt", "1.0 a.png\n2.0 b.png\n3.0 c.png\n");
   EXPECT_THAT(Complaint(folder_), HasSubstr("none of the 3 images can be read; a.png"));

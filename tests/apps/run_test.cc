@@ -1,0 +1,262 @@
+// `rotslam run` and `rotslam rotations` from pictures to files, on small sequences with exact
+// truth.
+
+#include <filesystem>
+#include <string>
+#include <vector>
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include "output/g2o.h"
+#include "tests/apps/run_directory.h"
+
+namespace rotslam {
+namespace {
+
+namespace fs = std::filesystem;
+using testing::ElementsAre;
+using testing::HasSubstr;
+
+constexpr std::size_t kNumFrames = 60;
+
+class RunCommand : public testing::Test {
+ protected:
+  static void SetUpTestSuite() {
+    shared_ = new TemporaryFolder;
+    for (const std::string kind : {"gimbal", "handheld"}) {
+      const CommandResult simulated = Rotslam({"simulate",
+                                               kind,
+                                               "--width=320",
+                                               "--height=240",
+                                               "--frames=" + std::to_string(kNumFrames),
+                                               "--out=" + Sequence(kind).string()});
+      ASSERT_EQ(simulated.exit_code, 0) << simulated.error;
+      const CommandResult run =
+          Rotslam({"run", Sequence(kind).string(), "--out=" + Out(kind).string()});
+      ASSERT_EQ(run.exit_code, 0) << run.error;
+    }
+  }
+  static void TearDownTestSuite() {
+    delete shared_;
+    shared_ = nullptr;
+  }
+
+  static fs::path Sequence(const std::string& kind) { return shared_->path() / kind; }
+  static fs::path Out(const std::string& kind) { return shared_->path() / (kind + "_out"); }
+  static fs::path Truth(const std::string& kind) { return Sequence(kind) / "groundtruth_tum.txt"; }
+
+ private:
+  static inline const TemporaryFolder* shared_ = nullptr;
+};
+
+class OnBothSequences : public RunCommand, public testing::WithParamInterface<const char*> {
+ protected:
+  fs::path Sequence() const { return RunCommand::Sequence(GetParam()); }
+  fs::path Out() const { return RunCommand::Out(GetParam()); }
+  fs::path Truth() const { return RunCommand::Truth(GetParam()); }
+};
+
+INSTANTIATE_TEST_SUITE_P(Run, OnBothSequences, testing::Values("gimbal", "handheld"));
+
+TEST_P(OnBothSequences, WritesItsFilesAndNoOthers) {
+  EXPECT_THAT(FileNames(Out()),
+              ElementsAre("cloud.ply",
+                          "keyframes_tum.txt",
+                          "rotations_tum.txt",
+                          "segments.csv",
+                          "summary.json",
+                          "trajectory_kitti.txt",
+                          "trajectory_tum.txt",
+                          "view_graph.g2o"));
+}
+
+TEST_P(OnBothSequences, GivesEveryFrameAPose) {
+  const Trajectory truth = ReadTrajectory(Truth());
+  const Trajectory poses = ReadTrajectory(Out() / "trajectory_tum.txt");
+  const Trajectory kitti = ReadTrajectory(Out() / "trajectory_kitti.txt");
+  const Trajectory rotations = ReadTrajectory(Out() / "rotations_tum.txt");
+  ASSERT_EQ(truth.size(), kNumFrames);
+  ASSERT_EQ(poses.size(), kNumFrames);
+  ASSERT_EQ(kitti.size(), kNumFrames);
+  ASSERT_EQ(rotations.size(), kNumFrames);
+  for (std::size_t k = 0; k < kNumFrames; ++k) {
+    EXPECT_NEAR(poses[k].timestamp_s, truth[k].timestamp_s, 1e-9);
+    EXPECT_EQ(rotations[k].timestamp_s, poses[k].timestamp_s);
+    EXPECT_EQ(rotations[k].center_in_world, Eigen::Vector3d::Zero());
+    // Both files hold twelve digits of the same pose.
+    EXPECT_LT((kitti[k].world_from_cam.Inverse() * poses[k].world_from_cam).Angle(), 1e-10);
+    EXPECT_LT((kitti[k].center_in_world - poses[k].center_in_world).norm(), 1e-9);
+  }
+}
+
+TEST_P(OnBothSequences, KeyframesAreFramesOfTheTrajectory) {
+  const std::vector<std::string> all = Lines(ReadWholeFile(Out() / "trajectory_tum.txt"));
+  const std::vector<std::string> keyframes = Lines(ReadWholeFile(Out() / "keyframes_tum.txt"));
+  EXPECT_GE(keyframes.size(), 5u);
+  EXPECT_LT(keyframes.size(), kNumFrames);
+  for (const std::string& line : keyframes) EXPECT_THAT(all, testing::Contains(line));
+}
+
+TEST_P(OnBothSequences, CloudHoldsThousandsOfPoints) {
+  // 6,749 handheld and 7,735 gimbal.
+  EXPECT_GT(CountPlyPoints(Out() / "cloud.ply"), 2000);
+}
+
+TEST_P(OnBothSequences, OrientationsAreThoseOfTheCamera) {
+  // 0.02 deg both, root mean square; the truth of the rendering is exact.
+  EXPECT_LT(Compare(Truth(), Out() / "rotations_tum.txt").rpe1_deg, 0.06);
+  EXPECT_LT(Compare(Truth(), Out() / "trajectory_tum.txt").rpe1_deg, 0.06);
+  EXPECT_LT(Compare(Truth(), Out() / "trajectory_tum.txt").rpen_deg, 0.3);
+}
+
+TEST_P(OnBothSequences, ViewGraphCanBeRead) {
+  const PoseGraph pose_graph = ReadG2o(Out() / "view_graph.g2o");
+  const Trajectory rotations = ReadTrajectory(Out() / "rotations_tum.txt");
+  ASSERT_EQ(pose_graph.cam_from_world.size(), kNumFrames);
+  // Four neighbours each where nothing goes wrong.
+  EXPECT_GE(pose_graph.graph.edges().size(), 3 * kNumFrames);
+  for (const auto& [frame, cam_from_world] : pose_graph.cam_from_world) {
+    EXPECT_LT((cam_from_world * rotations[frame.value].world_from_cam).Angle(), 1e-6);
+  }
+  for (const RelativeRotation& edge : pose_graph.graph.edges()) {
+    const Rotation j_from_i =
+        pose_graph.cam_from_world.at(edge.j) * pose_graph.cam_from_world.at(edge.i).Inverse();
+    EXPECT_LT((j_from_i.Inverse() * edge.j_from_i).Angle(), 0.02);
+  }
+}
+
+void ExpectFinite(const nlohmann::ordered_json& json, const std::string& name) {
+  if (json.is_structured()) {
+    for (const auto& [key, value] : json.items()) ExpectFinite(value, name + "." + key);
+  }
+  EXPECT_FALSE(json.is_null()) << name << " is null: the number was not finite";
+}
+
+TEST_P(OnBothSequences, SummarySaysWhatWasDone) {
+  const nlohmann::ordered_json summary = ReadSummary(Out());
+  std::vector<std::string> keys;
+  for (const auto& [key, value] : summary.items()) keys.push_back(key);
+  EXPECT_THAT(keys,
+              ElementsAre("version",
+                          "command",
+                          "options",
+                          "sequence",
+                          "camera",
+                          "counts",
+                          "seconds",
+                          "rotodom",
+                          "krot",
+                          "ba",
+                          "segments"));
+  for (const auto& [key, value] : summary.items()) {
+    if (key != "options") ExpectFinite(value, key);  // an option may be infinite
+  }
+  EXPECT_EQ(summary["command"], "run");
+  EXPECT_EQ(summary["counts"]["frames"], kNumFrames);
+  EXPECT_EQ(summary["counts"]["unreadable_frames"], 0);
+  EXPECT_EQ(summary["counts"]["keyframes"],
+            Lines(ReadWholeFile(Out() / "keyframes_tum.txt")).size());
+  EXPECT_LE(CountPlyPoints(Out() / "cloud.ply"), summary["counts"]["points"].get<std::int64_t>());
+  EXPECT_EQ(summary["krot"]["status"], "converged");
+  EXPECT_LE(summary["krot"]["gamma_low"].get<double>(),
+            summary["krot"]["gamma_high"].get<double>());
+  EXPECT_LE(summary["ba"]["final_cost"].get<double>(), summary["ba"]["initial_cost"].get<double>());
+  EXPECT_LT(summary["ba"]["mean_error_px"].get<double>(), 0.5);
+  EXPECT_EQ(summary["camera"]["model"], "pinhole");
+}
+
+TEST_P(OnBothSequences, SegmentsCoverAllFramesOnce) {
+  int next = 0;
+  for (const SegmentRow& row : ReadSegments(Out() / "segments.csv")) {
+    EXPECT_EQ(row.first, next);
+    EXPECT_LE(row.first, row.last);
+    next = row.last + 1;
+  }
+  EXPECT_EQ(next, static_cast<int>(kNumFrames));
+}
+
+TEST_P(OnBothSequences, RotationsStopsAfterTheSameOrientations) {
+  const TemporaryFolder folder;
+  const CommandResult result =
+      Rotslam({"rotations", Sequence().string(), "--out=" + folder.path().string()});
+  ASSERT_EQ(result.exit_code, 0) << result.error;
+  EXPECT_THAT(FileNames(folder.path()),
+              ElementsAre("rotations_tum.txt", "summary.json", "view_graph.g2o"));
+  for (const char* name : {"rotations_tum.txt", "view_graph.g2o"}) {
+    EXPECT_EQ(ReadWholeFile(folder.path() / name), ReadWholeFile(Out() / name)) << name;
+  }
+  EXPECT_EQ(ReadSummary(folder.path())["command"], "rotations");
+  EXPECT_EQ(ReadSummary(folder.path())["options"], ReadSummary(Out())["options"]);
+}
+
+TEST_F(RunCommand, HandheldPositionsAreThoseOfTheCamera) {
+  const TrajectoryMetrics metrics =
+      Compare(Truth("handheld"), Out("handheld") / "trajectory_tum.txt");
+  ASSERT_TRUE(metrics.ate_m.has_value());
+  // 0.16 % of the way.
+  EXPECT_LT(*metrics.ate_m, 0.006 * metrics.path_length_m);
+}
+
+// Part of a trajectory as a metric sees it.
+double AteOfFrames(const Trajectory& truth, const Trajectory& estimate, int first, int last) {
+  const Trajectory part(estimate.begin() + first, estimate.begin() + last + 1);
+  const TrajectoryMetrics metrics = ComputeMetrics(AssociatePoses(truth, part, {}), {});
+  EXPECT_TRUE(metrics.ate_m.has_value());
+  return metrics.ate_m.value_or(1e9) / metrics.path_length_m;
+}
+
+TEST_F(RunCommand, GimbalStandsWhileItOnlyRotates) {
+  const Trajectory truth = ReadTrajectory(Truth("gimbal"));
+  const Trajectory poses = ReadTrajectory(Out("gimbal") / "trajectory_tum.txt");
+  std::vector<SegmentRow> true_turns = ReadSegments(Sequence("gimbal") / "segments_truth.csv");
+  std::vector<SegmentRow> turns = ReadSegments(Out("gimbal") / "segments.csv");
+  const auto moves = [](const SegmentRow& row) { return row.kind != "rotating"; };
+  std::erase_if(true_turns, moves);
+  std::erase_if(turns, moves);
+  ASSERT_EQ(true_turns.size(), 1u);
+  ASSERT_EQ(turns.size(), 1u);
+  // The first and last step of the turn barely tell whether the camera still moves.
+  EXPECT_NEAR(turns[0].first, true_turns[0].first, 2);
+  EXPECT_NEAR(turns[0].last, true_turns[0].last, 2);
+
+  const std::vector<std::string> lines = Lines(ReadWholeFile(Out("gimbal") / "trajectory_tum.txt"));
+  ASSERT_EQ(lines.size(), kNumFrames);
+  const auto position_text = [&](int frame) {
+    std::istringstream words(lines[frame]);
+    std::string time, x, y, z;
+    words >> time >> x >> y >> z;
+    return x + " " + y + " " + z;
+  };
+  for (int frame = turns[0].first; frame <= turns[0].last; ++frame) {
+    EXPECT_EQ(position_text(frame), position_text(turns[0].first)) << frame;
+  }
+  // Nothing ties the scales on both sides of the turn: each side is measured by itself.
+  EXPECT_LT(AteOfFrames(truth, poses, 0, turns[0].first), 0.02);
+  EXPECT_LT(AteOfFrames(truth, poses, turns[0].last, kNumFrames - 1), 0.02);
+  // By default the speed goes on as it was, which is true of this path: 2.3 % of the way.
+  const TrajectoryMetrics metrics = Compare(Truth("gimbal"), Out("gimbal") / "trajectory_tum.txt");
+  EXPECT_LT(metrics.ate_m.value_or(1e9), 0.06 * metrics.path_length_m);
+}
+
+TEST_F(RunCommand, TakesFirstLastAndStride) {
+  const TemporaryFolder folder;
+  const CommandResult result = Rotslam({"run",
+                                        Sequence("handheld").string(),
+                                        "--out=" + folder.path().string(),
+                                        "--first=3",
+                                        "--last=50",
+                                        "--stride=2"});
+  ASSERT_EQ(result.exit_code, 0) << result.error;
+  EXPECT_THAT(result.error, HasSubstr("24 frames"));
+  const Trajectory truth = ReadTrajectory(Truth("handheld"));
+  const Trajectory poses = ReadTrajectory(folder.path() / "trajectory_tum.txt");
+  ASSERT_EQ(poses.size(), 24u);
+  for (std::size_t k = 0; k < poses.size(); ++k) {
+    EXPECT_NEAR(poses[k].timestamp_s, truth[3 + 2 * k].timestamp_s, 1e-9);
+  }
+  EXPECT_LT(Compare(Truth("handheld"), folder.path() / "trajectory_tum.txt").rpe1_deg, 0.1);
+}
+
+}  // namespace
+}  // namespace rotslam

@@ -1,0 +1,116 @@
+// `rotslam run` with every layout and camera model, and its promise of the same bytes every time.
+
+#include <filesystem>
+#include <string>
+#include <vector>
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include "tests/apps/run_directory.h"
+
+namespace rotslam {
+namespace {
+
+namespace fs = std::filesystem;
+
+class RunVariants : public testing::Test {
+ protected:
+  // Renders 45 frames of a walk through the room.
+  fs::path Simulate(const std::vector<std::string>& more,
+                    const std::string& kind = "handheld") const {
+    const fs::path sequence = folder_.path() / "sequence";
+    const CommandResult result =
+        Rotslam({"simulate", kind, "--frames=45", "--out=" + sequence.string()}, more);
+    EXPECT_EQ(result.exit_code, 0) << result.error;
+    return sequence;
+  }
+
+  fs::path Run(const fs::path& sequence,
+               const std::string& name,
+               const std::vector<std::string>& more = {}) const {
+    const fs::path out = folder_.path() / name;
+    const CommandResult result = Rotslam({"run", sequence.string(), "--out=" + out.string()}, more);
+    EXPECT_EQ(result.exit_code, 0) << result.error;
+    return out;
+  }
+
+  // Bands of three times what was measured when they were set.
+  static void ExpectGood(const fs::path& sequence, const fs::path& out) {
+    EXPECT_EQ(ReadTrajectory(out / "trajectory_tum.txt").size(), 45u);
+    const TrajectoryMetrics metrics =
+        Compare(sequence / "groundtruth_tum.txt", out / "trajectory_tum.txt");
+    EXPECT_LT(metrics.rpe1_deg, 0.06);
+    ASSERT_TRUE(metrics.ate_m.has_value());
+    EXPECT_LT(*metrics.ate_m, 0.01 * metrics.path_length_m);
+    EXPECT_GT(CountPlyPoints(out / "cloud.ply"), 1500);
+    RecordProperty("rpe1_deg", std::to_string(metrics.rpe1_deg));
+    RecordProperty("ate_ratio", std::to_string(*metrics.ate_m / metrics.path_length_m));
+  }
+
+  const TemporaryFolder folder_;
+};
+
+TEST_F(RunVariants, EurocLayout) {
+  const fs::path sequence = Simulate({"--layout=euroc", "--width=320", "--height=240"});
+  ExpectGood(sequence, Run(sequence, "out"));
+}
+
+TEST_F(RunVariants, Colour) {
+  const fs::path sequence = Simulate({"--color", "--width=320", "--height=240"});
+  ExpectGood(sequence, Run(sequence, "out"));
+}
+
+TEST_F(RunVariants, RadtanCamera) {
+  const std::string camera = folder_
+                                 .Write("radtan.yaml",
+                                        "model: radtan\nwidth: 376\nheight: 240\n"
+                                        "fx: 229.3\nfy: 228.6\ncx: 183.6\ncy: 124.2\n"
+                                        "distortion: [-0.283, 0.0739, 0.00019, 1.76e-5, 0]\n")
+                                 .string();
+  const fs::path sequence = Simulate({"--camera", camera});
+  ExpectGood(sequence, Run(sequence, "out", {"--camera", camera}));
+}
+
+TEST_F(RunVariants, EquidistantCamera) {
+  const std::string camera = folder_
+                                 .Write("equidistant.yaml",
+                                        "model: equidistant\nwidth: 320\nheight: 320\n"
+                                        "fx: 120.1\nfy: 120.3\ncx: 159.1\ncy: 160.6\n"
+                                        "distortion: [0.0034, 0.00077, -0.0018, 0.0004]\n")
+                                 .string();
+  const fs::path sequence = Simulate({"--camera", camera});
+  ExpectGood(sequence, Run(sequence, "out", {"--camera", camera}));
+}
+
+TEST_F(RunVariants, SameBytesEveryTimeAndAtAnyNumberOfThreads) {
+  for (const std::string kind : {"gimbal", "handheld"}) {
+    SCOPED_TRACE(kind);
+    fs::remove_all(folder_.path() / "sequence");
+    const fs::path sequence = Simulate({"--width=320", "--height=240"}, kind);
+    const fs::path first = Run(sequence, kind + "_1", {"--threads=1"});
+    for (const std::string threads : {"1", "2", "5"}) {
+      SCOPED_TRACE(threads + " threads");
+      const fs::path again = Run(sequence, kind + "_again", {"--threads=" + threads});
+      ASSERT_EQ(FileNames(first), FileNames(again));
+      for (const std::string& name : FileNames(first)) {
+        if (name == "summary.json") continue;
+        EXPECT_TRUE(ReadWholeFile(first / name) == ReadWholeFile(again / name)) << name;
+      }
+      nlohmann::ordered_json a = ReadSummary(first);
+      nlohmann::ordered_json b = ReadSummary(again);
+      EXPECT_TRUE(a.contains("seconds"));
+      a.erase("seconds");
+      b.erase("seconds");
+      EXPECT_EQ(a.dump(), b.dump());
+    }
+  }
+}
+
+TEST_F(RunVariants, AnotherSeedIsAsGood) {
+  const fs::path sequence = Simulate({"--width=320", "--height=240"});
+  ExpectGood(sequence, Run(sequence, "out", {"--seed=77"}));
+}
+
+}  // namespace
+}  // namespace rotslam

@@ -1,0 +1,101 @@
+// The whole chain on real sequences, where they are present.
+
+#include <filesystem>
+#include <string>
+#include <vector>
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include "tests/apps/run_directory.h"
+
+namespace rotslam {
+namespace {
+
+namespace fs = std::filesystem;
+
+class SharedData : public testing::Test {
+ protected:
+  // Whether the sequence is there; a test without one is skipped.
+  static bool IsThere(const std::string& name) { return fs::exists(Data(name)); }
+  static fs::path Data(const std::string& name) {
+    return fs::path(ROTSLAM_SHARED_DIR) / "data" / name;
+  }
+  static std::string Camera(const std::string& name) {
+    return (fs::path(ROTSLAM_CONFIG_DIR) / "cameras" / name).string();
+  }
+
+  // Runs a command on the sequence; its results lie in Out().
+  void Do(const std::string& command,
+          const std::string& sequence,
+          const std::vector<std::string>& more) const {
+    const CommandResult result =
+        Rotslam({command, Data(sequence).string(), "--out=" + Out().string()}, more);
+    ASSERT_EQ(result.exit_code, 0) << result.error;
+  }
+
+  fs::path Out() const { return folder_.path() / "out"; }
+
+  std::size_t NumPoses(const std::string& file) const {
+    return ReadTrajectory(Out() / file).size();
+  }
+
+ private:
+  const TemporaryFolder folder_;
+};
+
+#define ROTSLAM_SKIP_WITHOUT(name) \
+  if (!IsThere(name)) GTEST_SKIP() << Data(name) << " is not here"
+
+TEST_F(SharedData, Kitti00) {
+  ROTSLAM_SKIP_WITHOUT("kitti00");
+  ASSERT_NO_FATAL_FAILURE(Do("run", "kitti00", {}));
+  EXPECT_EQ(NumPoses("trajectory_tum.txt"), 200u);
+  // Its poses.txt with times of its own is the truth in KITTI form.
+  const MetricsOptions options;
+  const TrajectoryMetrics metrics = ComputeMetrics(
+      AssociatePoses(ReadTrajectory(Data("kitti00/poses.txt"), Data("kitti00/times.txt")),
+                     ReadTrajectory(Out() / "trajectory_tum.txt"),
+                     options),
+      options);
+  EXPECT_EQ(metrics.num_poses, 200);
+  EXPECT_LE(metrics.rpe1_deg, 0.080);  // ORB-SLAM2's; the truth's own error is 0.061
+  EXPECT_LT(metrics.ate_m.value_or(1e9), 2.0);
+  EXPECT_GT(CountPlyPoints(Out() / "cloud.ply"), 5000);
+}
+
+TEST_F(SharedData, SevenScenesKitchen) {
+  ROTSLAM_SKIP_WITHOUT("7scenes_kitchen");
+  ASSERT_NO_FATAL_FAILURE(Do("run", "7scenes_kitchen", {"--camera", Camera("7scenes.yaml")}));
+  const fs::path truth = Data("7scenes_kitchen/groundtruth_tum.txt");
+  EXPECT_EQ(NumPoses("trajectory_tum.txt"), FileNames(Data("7scenes_kitchen/images")).size());
+  const TrajectoryMetrics metrics = Compare(truth, Out() / "trajectory_tum.txt");
+  EXPECT_LE(metrics.rpe1_deg, 0.247);  // ORB-SLAM2's
+  EXPECT_LT(metrics.ate_m.value_or(1e9), 0.10);
+  EXPECT_GT(CountPlyPoints(Out() / "cloud.ply"), 5000);
+}
+
+TEST_F(SharedData, Pan720) {
+  ROTSLAM_SKIP_WITHOUT("pan720");
+  ASSERT_NO_FATAL_FAILURE(Do("rotations", "pan720", {"--camera", Camera("pan720.yaml")}));
+  EXPECT_EQ(NumPoses("rotations_tum.txt"), FileNames(Data("pan720/images")).size());
+  const TrajectoryMetrics metrics =
+      Compare(Data("pan720/groundtruth_tum.txt"), Out() / "rotations_tum.txt");
+  EXPECT_LT(metrics.rpe1_deg, 0.01);
+}
+
+TEST_F(SharedData, TumFreiburg1Rpy) {
+  ROTSLAM_SKIP_WITHOUT("tum_fr1_rpy");
+  ASSERT_NO_FATAL_FAILURE(Do("rotations", "tum_fr1_rpy", {"--camera", Camera("tum_fr1.yaml")}));
+  std::size_t listed = 0;
+  for (const std::string& line : Lines(ReadWholeFile(Data("tum_fr1_rpy/rgb.txt")))) {
+    listed += !line.empty() && line[0] != '#';
+  }
+  EXPECT_EQ(NumPoses("rotations_tum.txt"), listed);
+  const TrajectoryMetrics metrics =
+      Compare(Data("tum_fr1_rpy/groundtruth.txt"), Out() / "rotations_tum.txt");
+  EXPECT_LT(metrics.rpe1_deg, 0.562);  // ORB-SLAM2's, on the 65 % that it keeps
+}
+
+}  // namespace
+}  // namespace rotslam
