@@ -87,7 +87,8 @@ TEST(RotationalOdometry, ReportsWhatEachFrameBrought) {
   EXPECT_EQ(static_cast<int>(odometry.result().graph.edges().size()), num_edges);
   ASSERT_EQ(odometry.result().edge_matches.size(), odometry.result().graph.edges().size());
   for (const EdgeMatches& matches : odometry.result().edge_matches) {
-    const RelativeRotation* edge = odometry.result().graph.FindEdge(matches.frame_i, matches.frame_j);
+    const RelativeRotation* edge =
+        odometry.result().graph.FindEdge(matches.frame_i, matches.frame_j);
     ASSERT_NE(edge, nullptr);
     EXPECT_EQ(static_cast<int>(matches.pairs.size()), edge->num_inliers);
   }
@@ -102,7 +103,8 @@ TEST(RotationalOdometry, TheFirstFrameIsTheWorld) {
 
 void ExpectSameBytes(const RotationalOdometry& a, const RotationalOdometry& b) {
   for (const auto& [frame, rotation] : a.result().cam_from_world) {
-    EXPECT_EQ(rotation.Quaternion().coeffs(), b.result().cam_from_world.at(frame).Quaternion().coeffs());
+    EXPECT_EQ(rotation.Quaternion().coeffs(),
+              b.result().cam_from_world.at(frame).Quaternion().coeffs());
   }
   ASSERT_EQ(a.result().edge_matches.size(), b.result().edge_matches.size());
   for (std::size_t k = 0; k < a.result().edge_matches.size(); ++k) {
