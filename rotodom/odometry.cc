@@ -86,7 +86,7 @@ FrameReport RotationalOdometry::AddFrame(FrameId frame, double timestamp_s, cons
   KeepGoodConnections(connections, report);
   SharpenKeypoints(connections, camera_, view.features);
 
-  report.predicted_only = connections.empty() && !recent_.empty();
+  report.predicted_only = connections.empty() && result_.cam_from_world.size() > 1;
   StartFromBestEdge(frame, connections);
   for (Connection& connection : connections) {
     result_.graph.AddEdge(connection.edge);

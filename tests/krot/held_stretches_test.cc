@@ -155,9 +155,9 @@ TEST(HeldStretchOptions, NamesTheFirstFieldOutOfRange) {
   EXPECT_FALSE(HeldStretchOptions{}.Problem());
   HeldStretchOptions options;
   options.min_frames = 1;
-  EXPECT_EQ(options.Problem(), "min_frames = 1: must be at least 2");
+  EXPECT_EQ(options.Problem(), "min_frames is 1, must be at least 2");
   options.min_rotation_only_ratio = 0.0;
-  EXPECT_TRUE(options.Problem().value_or("none").starts_with("min_rotation_only_ratio = 0"));
+  EXPECT_TRUE(options.Problem().value_or("none").starts_with("min_rotation_only_ratio is 0"));
   EXPECT_THROW(FindHeldStretches({}, {}, options), std::invalid_argument);
 }
 

@@ -318,7 +318,7 @@ TEST(AveragingOptions, NamesTheFirstFieldOutOfRange) {
     return options.Problem().value_or("none");
   };
   using Options = AveragingOptions&;
-  EXPECT_EQ(problem([](Options o) { o.window = 0; }), "window = 0: must be at least 1");
+  EXPECT_EQ(problem([](Options o) { o.window = 0; }), "window is 0, must be at least 1");
   EXPECT_TRUE(problem([](Options o) { o.edge_floor_deg = 0.0; }).starts_with("edge_floor_deg"));
   EXPECT_TRUE(problem([](Options o) { o.loss_sigmas = -1.0; }).starts_with("loss_sigmas"));
   EXPECT_TRUE(problem([](Options o) { o.min_step_deg = NAN; }).starts_with("min_step_deg"));

@@ -199,12 +199,12 @@ TEST(FeatureOptions, NamesTheFirstFieldOutOfRange) {
   };
   using Options = FeatureOptions&;
   EXPECT_EQ(problem([](Options o) { o.max_features = 10; }),
-            "max_features = 10: must be at least 50");
-  EXPECT_TRUE(problem([](Options o) { o.num_levels = 0; }).starts_with("num_levels = 0"));
-  EXPECT_TRUE(problem([](Options o) { o.scale_factor = 1.0; }).starts_with("scale_factor = 1"));
+            "max_features is 10, must be at least 50");
+  EXPECT_TRUE(problem([](Options o) { o.num_levels = 0; }).starts_with("num_levels is 0"));
+  EXPECT_TRUE(problem([](Options o) { o.scale_factor = 1.0; }).starts_with("scale_factor is 1"));
   EXPECT_TRUE(
-      problem([](Options o) { o.min_fast_threshold = 0; }).starts_with("min_fast_threshold = 0"));
-  EXPECT_TRUE(problem([](Options o) { o.fast_threshold = 3; }).starts_with("fast_threshold = 3"));
+      problem([](Options o) { o.min_fast_threshold = 0; }).starts_with("min_fast_threshold is 0"));
+  EXPECT_TRUE(problem([](Options o) { o.fast_threshold = 3; }).starts_with("fast_threshold is 3"));
 }
 
 }  // namespace

@@ -225,16 +225,18 @@ TEST(MatchingOptions, NamesTheFirstFieldOutOfRange) {
     return options.Problem().value_or("none");
   };
   using Options = MatchingOptions&;
-  EXPECT_TRUE(problem([](Options o) { o.radius_px = 0.0; }).starts_with("radius_px = 0"));
-  EXPECT_TRUE(problem([](Options o) { o.wide_radius_px = 9.0; }).starts_with("wide_radius_px = 9"));
-  EXPECT_TRUE(problem([](Options o) { o.min_matches = -1; }).starts_with("min_matches = -1"));
-  EXPECT_TRUE(problem([](Options o) { o.max_distance = 257; }).starts_with("max_distance = 257"));
-  EXPECT_TRUE(problem([](Options o) { o.ratio = 1.1; }).starts_with("ratio = 1.1"));
-  EXPECT_TRUE(problem([](Options o) { o.max_level_step = -1; }).starts_with("max_level_step = -1"));
-  EXPECT_TRUE(problem([](Options o) { o.patch_px = 8; }).starts_with("patch_px = 8"));
-  EXPECT_TRUE(problem([](Options o) { o.patch_levels = 0; }).starts_with("patch_levels = 0"));
+  EXPECT_TRUE(problem([](Options o) { o.radius_px = 0.0; }).starts_with("radius_px is 0"));
   EXPECT_TRUE(
-      problem([](Options o) { o.max_correction_px = 0; }).starts_with("max_correction_px = 0"));
+      problem([](Options o) { o.wide_radius_px = 9.0; }).starts_with("wide_radius_px is 9"));
+  EXPECT_TRUE(problem([](Options o) { o.min_matches = -1; }).starts_with("min_matches is -1"));
+  EXPECT_TRUE(problem([](Options o) { o.max_distance = 257; }).starts_with("max_distance is 257"));
+  EXPECT_TRUE(problem([](Options o) { o.ratio = 1.1; }).starts_with("ratio is 1.1"));
+  EXPECT_TRUE(
+      problem([](Options o) { o.max_level_step = -1; }).starts_with("max_level_step is -1"));
+  EXPECT_TRUE(problem([](Options o) { o.patch_px = 8; }).starts_with("patch_px is 8"));
+  EXPECT_TRUE(problem([](Options o) { o.patch_levels = 0; }).starts_with("patch_levels is 0"));
+  EXPECT_TRUE(
+      problem([](Options o) { o.max_correction_px = 0; }).starts_with("max_correction_px is 0"));
   MatchingOptions bad;
   bad.ratio = 0.0;
   EXPECT_THROW(MatchFeatures({}, {}, {}, SmallCamera(), bad), std::invalid_argument);

@@ -168,15 +168,16 @@ TEST(RotationalOdometry, GoesOnAfterTheLensWasCovered) {
   std::vector<cv::Mat> images = Handheld().images;
   for (int k = 3; k < 8; ++k) images[k] = cv::Mat::zeros(240, 320, CV_8U);  // more than the window
   const OdometryRun run = RunOn(images);
-  EXPECT_TRUE(run.reports[8].predicted_only);
-  for (int k = 9; k < kNumFrames; ++k) EXPECT_GE(run.reports[k].num_edges, 1);
+  for (int k = 3; k < 8; ++k) EXPECT_TRUE(run.reports[k].predicted_only) << k;
+  for (int k = 8; k < kNumFrames; ++k) EXPECT_GE(run.reports[k].num_edges, 1) << k;
+  // The frames before the dark ones still serve.
+  EXPECT_NE(run.odometry.result().graph.FindEdge(FrameId{2}, FrameId{8}), nullptr);
   EXPECT_EQ(run.odometry.result().cam_from_world.size(), std::size_t(kNumFrames));
 }
 
-// Disabled because it fails: from the bad prediction that five dark frames leave, the estimator
-// ends in a second minimum of the epipolar cost, 0.4 deg a step off, with as many inliers and
-// residuals of 0.036 px instead of 0.028 px. Enable when EstimateRelativeRotation compares both
-// minima.
+// From the bad prediction that five dark frames leave, a descent on the epipolar distance may end
+// in a second minimum, 0.4 deg a step off, with as many inliers and residuals of 0.036 px instead
+// of 0.028 px.
 TEST(RotationalOdometry, IsAsExactAfterTheLensWasCovered) {
   std::vector<cv::Mat> images = Handheld().images;
   for (int k = 3; k < 8; ++k) images[k] = cv::Mat::zeros(240, 320, CV_8U);
@@ -206,9 +207,9 @@ TEST(OdometryOptions, NamesTheStageOfTheProblem) {
   EXPECT_FALSE(OdometryOptions{}.Problem());
   OdometryOptions options;
   options.averaging.window = 0;
-  EXPECT_EQ(options.Problem(), "averaging.window = 0: must be at least 1");
+  EXPECT_EQ(options.Problem(), "averaging.window is 0, must be at least 1");
   options.view_graph.window_frames = 0;
-  EXPECT_EQ(options.Problem(), "view_graph.window_frames = 0: must be at least 1");
+  EXPECT_EQ(options.Problem(), "view_graph.window_frames is 0, must be at least 1");
 }
 
 }  // namespace

@@ -44,7 +44,8 @@ std::vector<int> Values(const std::set<FrameId>& frames) {
 
 std::vector<int> Select(const Walk& walk,
                         const std::vector<HeldStretch>& held = {},
-                        const KeyframeOptions& options = {}) {
+                        const KeyframeOptions& options = {.min_parallax_deg = 1.0,
+                                                          .min_shared_ratio = 0.6}) {
   return Values(SelectKeyframes(walk.cam_from_world, walk.tracks, held, options));
 }
 
@@ -134,9 +135,9 @@ TEST(KeyframeOptions, NamesTheFirstFieldOutOfRange) {
   EXPECT_FALSE(KeyframeOptions{}.Problem());
   KeyframeOptions options;
   options.min_shared_ratio = 1.0;
-  EXPECT_TRUE(options.Problem().value_or("none").starts_with("min_shared_ratio = 1"));
+  EXPECT_TRUE(options.Problem().value_or("none").starts_with("min_shared_ratio is 1"));
   options.min_parallax_deg = 0.0;
-  EXPECT_TRUE(options.Problem().value_or("none").starts_with("min_parallax_deg = 0"));
+  EXPECT_TRUE(options.Problem().value_or("none").starts_with("min_parallax_deg is 0"));
   EXPECT_THROW(SelectKeyframes({}, {}, {}, options), std::invalid_argument);
 }
 

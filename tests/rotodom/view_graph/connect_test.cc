@@ -127,9 +127,9 @@ TEST(ViewGraphOptions, NamesTheFirstFieldOutOfRange) {
   EXPECT_FALSE(ViewGraphOptions{}.Problem());
   ViewGraphOptions options;
   options.min_edge_inliers = -1;
-  EXPECT_EQ(options.Problem(), "min_edge_inliers = -1: must be zero or more");
+  EXPECT_EQ(options.Problem(), "min_edge_inliers is -1, must be zero or more");
   options.window_frames = 0;
-  EXPECT_EQ(options.Problem(), "window_frames = 0: must be at least 1");
+  EXPECT_EQ(options.Problem(), "window_frames is 0, must be at least 1");
 }
 
 }  // namespace
