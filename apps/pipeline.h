@@ -25,7 +25,7 @@ struct PipelineOptions {
   BundleOptions ba;
   ResectionOptions resection;
   // Points whose rays meet at less than this stay out of the cloud: their depth is noise.
-  double cloud_min_angle_deg = 1.0;
+  double cloud_min_angle_deg = 2.0;
 
   std::optional<std::string> Problem() const;
 

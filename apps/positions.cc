@@ -342,7 +342,8 @@ PositionResult FindPositions(const Orientations& orientations,
                     std::to_string(result.num_interpolated) + " interpolated");
 
   progress.StartStage("cloud", -1);
-  result.cloud = MakeCloudOf(result, all_tracks, camera, bundle_options);
+  result.cloud = WithoutShallowPoints(MakeCloudOf(result, all_tracks, camera, bundle_options),
+                                      options.cloud_min_angle_deg);
   progress.EndStage(std::to_string(result.cloud.point_in_world.size()) + " points");
   return result;
 }

@@ -20,7 +20,7 @@ struct PositionResult {
   RotationMap cam_from_world;  // of every frame
   CenterMap center_in_world;   // of every frame
   Reconstruction map;          // refined keyframes, points and their tracks
-  Reconstruction cloud;        // every frame, and every track that its poses explain
+  Reconstruction cloud;        // every frame, and every deep enough track that its poses explain
   std::set<FrameId> keyframes;
   std::vector<HeldStretch> held;
   std::vector<MapComponent> components;  // by their first keyframe

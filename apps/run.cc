@@ -41,7 +41,7 @@ int Run(const RunFlags& flags) {
   const PositionResult positions =
       FindPositions(orientations, input.camera, options, flags.common.NumThreads(), progress);
   const double positions_s = SecondsSince(start) - orientations_s;
-  WritePositions(directory, orientations, positions, input.camera, options.cloud_min_angle_deg);
+  WritePositions(directory, orientations, positions, input.camera);
 
   RunSummary summary = StartSummary("run", input, orientations, DescribeOptions(options));
   AddPositions(positions, input.camera, summary);

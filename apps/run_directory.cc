@@ -87,8 +87,7 @@ void WriteOrientations(const std::filesystem::path& directory, const Orientation
 void WritePositions(const std::filesystem::path& directory,
                     const Orientations& orientations,
                     const PositionResult& positions,
-                    const Camera& camera,
-                    double cloud_min_angle_deg) {
+                    const Camera& camera) {
   const Trajectory trajectory = MakeTrajectory(
       orientations.timestamps_s, positions.cam_from_world, positions.center_in_world);
   WriteTumTrajectory(directory / "trajectory_tum.txt", trajectory);
@@ -99,8 +98,7 @@ void WritePositions(const std::filesystem::path& directory,
   WriteTumTrajectory(
       directory / "keyframes_tum.txt",
       MakeTrajectory(orientations.timestamps_s, positions.cam_from_world, keyframe_centers));
-  WritePly(directory / "cloud.ply",
-           MakeCloud(WithoutShallowPoints(positions.cloud, cloud_min_angle_deg), camera));
+  WritePly(directory / "cloud.ply", MakeCloud(positions.cloud, camera));
   WriteSegments(directory / "segments.csv", Segments(positions));
 }
 

@@ -15,13 +15,11 @@ std::filesystem::path PrepareRunDirectory(const std::string& out);
 /// rotations_tum.txt and view_graph.g2o.
 void WriteOrientations(const std::filesystem::path& directory, const Orientations& orientations);
 
-/// trajectory_tum.txt, trajectory_kitti.txt, keyframes_tum.txt, cloud.ply and segments.csv. Points
-/// whose rays meet at less than `cloud_min_angle_deg` stay out of the cloud.
+/// trajectory_tum.txt, trajectory_kitti.txt, keyframes_tum.txt, cloud.ply and segments.csv.
 void WritePositions(const std::filesystem::path& directory,
                     const Orientations& orientations,
                     const PositionResult& positions,
-                    const Camera& camera,
-                    double cloud_min_angle_deg);
+                    const Camera& camera);
 
 /// The parts of summary.json that `run` and `rotations` share.
 RunSummary StartSummary(const std::string& command,

@@ -68,7 +68,8 @@ double NumberAt(const std::filesystem::path& path, const TextRow& row, std::size
 
 std::string FormatNumber(const char* format, double value) {
   std::array<char, 400> buffer;  // the longest double in %f has 309 digits before its point
-  const int length = std::snprintf(buffer.data(), buffer.size(), format, value);
+  // Adding zero turns -0 into 0.
+  const int length = std::snprintf(buffer.data(), buffer.size(), format, value + 0.0);
   return std::string(buffer.data(), static_cast<std::size_t>(length));
 }
 
