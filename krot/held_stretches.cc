@@ -47,6 +47,9 @@ std::vector<HeldStretch> FindHeldStretches(const ViewGraph& graph,
   }
   std::vector<Evidence> steps(frames.size());  // steps[n]: from frame n-1 to frame n
   for (const RelativeRotation& edge : graph.edges()) {
+    if (!position.contains(edge.i) || !position.contains(edge.j)) {
+      throw std::invalid_argument("FindHeldStretches: an edge names a frame without orientation");
+    }
     const int first = position.at(edge.i);
     const int last = position.at(edge.j);
     for (int n = first + 1; n <= last; ++n) steps[n].Add(last - first, edge.rotation_only);

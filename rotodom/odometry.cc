@@ -63,6 +63,13 @@ FrameReport RotationalOdometry::AddFrame(FrameId frame, double timestamp_s, cons
   if (!result_.cam_from_world.empty() && frame <= result_.cam_from_world.rbegin()->first) {
     throw std::invalid_argument("RotationalOdometry: frame ids must ascend");
   }
+  if (!timestamps_s_.empty() && !(timestamp_s > timestamps_s_.rbegin()->second)) {
+    throw std::invalid_argument("RotationalOdometry: timestamps must ascend");
+  }
+  const bool sized = camera_.width > 0 && camera_.height > 0;
+  if (sized && !image.empty() && (image.cols != camera_.width || image.rows != camera_.height)) {
+    throw std::invalid_argument("RotationalOdometry: the image has not the camera's size");
+  }
   FrameReport report;
   report.frame = frame;
   result_.cam_from_world[frame] = PredictOrientation(timestamp_s);

@@ -68,9 +68,10 @@ struct Matches {
 /// Image pyramid for RefineMatches, as cv::calcOpticalFlowPyrLK takes it.
 std::vector<cv::Mat> BuildPatchPyramid(const cv::Mat& grey, const MatchingOptions& options);
 
-/// Matches two frames' descriptors around the positions that the predicted rotation gives: mutual
-/// best, ratio test, agreement of the patch orientations; wider only where too few are found. Cost:
-/// proportional to n_i times the number of features in the search circle.
+/// Matches two frames' descriptors around the positions that the predicted rotation gives: the best
+/// candidate of each keypoint of frame i by ratio test; of several that chose the same keypoint of
+/// frame j, the nearest; of those, the ones whose patches turn as most do. Searches wider only
+/// where too few are found. Cost:    n_i times the number of features in the search circle.
 Matches MatchFeatures(const Features& features_i,
                       const Features& features_j,
                       const Rotation& predicted_j_from_i,

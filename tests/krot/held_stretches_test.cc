@@ -151,6 +151,15 @@ TEST(FindHeldStretches, NothingGivesNothing) {
   EXPECT_TRUE(FindHeldStretches({}, {{FrameId{0}, Rotation()}}, {}).empty());
 }
 
+TEST(FindHeldStretches, RejectsAnEdgeToAFrameWithoutOrientation) {
+  ViewGraph graph;
+  RelativeRotation edge;
+  edge.i = FrameId{0};
+  edge.j = FrameId{7};
+  graph.AddEdge(edge);
+  EXPECT_THROW(FindHeldStretches(graph, {{FrameId{0}, Rotation()}}, {}), std::invalid_argument);
+}
+
 TEST(HeldStretchOptions, NamesTheFirstFieldOutOfRange) {
   EXPECT_FALSE(HeldStretchOptions{}.Problem());
   HeldStretchOptions options;

@@ -201,6 +201,9 @@ TEST(RotationalOdometry, RejectsABrokenContract) {
   EXPECT_THROW(odometry.AddFrame(FrameId{4}, 2.0, cv::Mat()), std::invalid_argument);
   EXPECT_THROW(odometry.AddFrame(FrameId{3}, 2.0, cv::Mat()), std::invalid_argument);
   EXPECT_NO_THROW(odometry.AddFrame(FrameId{5}, 2.0, cv::Mat()));
+  EXPECT_THROW(odometry.AddFrame(FrameId{6}, 2.0, cv::Mat()), std::invalid_argument);
+  EXPECT_THROW(odometry.AddFrame(FrameId{6}, 3.0, cv::Mat::zeros(10, 20, CV_8U)),
+               std::invalid_argument);
 }
 
 TEST(OdometryOptions, NamesTheStageOfTheProblem) {
