@@ -4,6 +4,7 @@
 #include <exception>
 #include <string>
 
+#include <glog/logging.h>
 #include <opencv2/core/utility.hpp>
 
 #include "apps/command.h"
@@ -46,6 +47,8 @@ int main(int argc, char** argv) {
     app.require_subcommand(1);
     // FFmpeg writes to stderr by itself what we report in our own words; -8 is its "quiet".
     setenv("OPENCV_FFMPEG_LOGLEVEL", "-8", 0);
+    // Ceres warns of steps that it then takes otherwise; what matters is in our own results.
+    FLAGS_minloglevel = google::GLOG_ERROR;
     // Our stages bring their own threads; OpenCV's pool under them only gets in the way.
     cv::setNumThreads(1);
     rotslam::Action action;

@@ -11,7 +11,7 @@ packages=(
   # rotodom
   libeigen3-dev libopencv-dev libyaml-cpp-dev
   # krot and ba
-  coinor-libclp-dev libceres-dev
+  coinor-libclp-dev libceres-dev libgoogle-glog-dev
   # output and apps
   libcli11-dev libpcl-dev nlohmann-json3-dev
   # tests; GLPK and OpenGV to compare with, numpy for the independent check of `rotslam eval`

@@ -240,7 +240,7 @@ class Sampler {
   Eigen::Vector3d DrawInBall() {
     const auto uniform = [&] { return static_cast<double>(random_() >> 11) * 0x1.0p-52 - 1.0; };
     while (true) {
-      const Eigen::Vector3d vector(uniform(), uniform(), uniform());
+      Eigen::Vector3d vector(uniform(), uniform(), uniform());
       if (vector.squaredNorm() <= 1.0) return vector;
     }
   }
