@@ -46,7 +46,8 @@ int main(int argc, char** argv) {
                  "rotslam");
     app.require_subcommand(1);
     // FFmpeg writes to stderr by itself what we report in our own words; -8 is its "quiet".
-    setenv("OPENCV_FFMPEG_LOGLEVEL", "-8", 0);
+    // No thread runs yet.
+    setenv("OPENCV_FFMPEG_LOGLEVEL", "-8", 0);  // NOLINT(concurrency-mt-unsafe)
     // Ceres warns of steps that it then takes otherwise; what matters is in our own results.
     FLAGS_minloglevel = google::GLOG_ERROR;
     // Our stages bring their own threads; OpenCV's pool under them only gets in the way.
