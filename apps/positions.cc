@@ -301,7 +301,10 @@ PositionResult FindPositions(const Orientations& orientations,
   krot_options.num_threads = num_threads;
   result.krot = SolveKnownRotation(keyframe_rotations, tracks, camera, krot_options);
   progress.EndStage(result.krot.message);
-  if (!result.krot.Usable()) return WithoutMap(std::move(result), result.krot.message);
+  if (!result.krot.Usable()) {
+    std::string failure = result.krot.message;
+    return WithoutMap(std::move(result), std::move(failure));
+  }
 
   progress.StartStage("bundle adjustment", -1);
   BundleOptions bundle_options = options.ba;

@@ -66,7 +66,7 @@ std::vector<Segment> Segments(const PositionResult& positions) {
 
 std::filesystem::path PrepareRunDirectory(const std::string& out) {
   if (out.empty()) throw std::runtime_error("--out names no folder for the results");
-  const std::filesystem::path directory = out;
+  std::filesystem::path directory = out;
   std::error_code error;
   std::filesystem::create_directories(directory, error);
   if (error || !std::filesystem::is_directory(directory)) {
