@@ -1,6 +1,7 @@
 #include "apps/progress.h"
 
 #include <algorithm>
+#include <cmath>
 #include <cstdio>
 
 #include <sys/ioctl.h>
@@ -69,7 +70,7 @@ std::string Progress::Figures(int done) const {
   const double seconds = std::max(SecondsSince(started_), 1e-6);
   const double fps = done / seconds;
   if (total_ > 0 && fps > 0.0) {
-    const int eta = static_cast<int>((total_ - done) / fps + 0.5);
+    const int eta = static_cast<int>(std::lround((total_ - done) / fps));
     std::snprintf(
         text, sizeof(text), "%d/%d  %.1f fps  ETA %d:%02d", done, total_, fps, eta / 60, eta % 60);
   } else {
