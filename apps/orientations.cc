@@ -49,10 +49,12 @@ std::vector<FrameId> FindBreaks(const ViewGraph& graph, const RotationMap& rotat
 
 Orientations FindOrientations(Input& input,
                               const OdometryOptions& options,
+                              bool keep_features,
                               const CommonFlags& flags,
                               Progress& progress) {
   RotationalOdometry odometry(input.camera, options, flags.seed, flags.NumThreads());
   Orientations orientations;
+  RotationMap window;  // what is not settled yet
   progress.StartStage("orientations", input.sequence->NumFrames());
   while (const std::optional<Frame> frame = input.sequence->Next()) {
     if (frame->image.empty()) {
@@ -60,12 +62,21 @@ Orientations FindOrientations(Input& input,
                     " skipped, its pose is interpolated: " + frame->problem);
       ++orientations.num_unreadable;
     }
-    const FrameReport report = odometry.AddFrame(frame->id, frame->timestamp_s, frame->image);
+    FrameEstimate estimate = odometry.AddFrame(frame->id, frame->timestamp_s, frame->image);
     orientations.timestamps_s.push_back(frame->timestamp_s);
-    orientations.num_weak += report.weak;
-    progress.Step(frame->id.value + 1, std::to_string(report.num_inliers) + " inliers");
+    orientations.num_weak += estimate.report.weak;
+    orientations.reports.push_back(estimate.report);
+    progress.Step(frame->id.value + 1, std::to_string(estimate.report.num_inliers) + " inliers");
+    window = estimate.window;
+    orientations.Add(std::move(estimate), keep_features);
   }
-  static_cast<OdometryResult&>(orientations) = std::move(odometry).TakeResult();
+
+  orientations.seconds = odometry.seconds();
+  for (const auto& [frame, rotation] : window) {
+    if (const auto covariance = odometry.CovarianceOf(frame)) {
+      orientations.covariance[frame] = *covariance;
+    }
+  }
 
   const int num_frames = static_cast<int>(orientations.timestamps_s.size());
   if (num_frames < 3) {
@@ -82,6 +93,8 @@ Orientations FindOrientations(Input& input,
     orientations.num_predicted += orientations.graph.EdgesOf(frame).empty();
   }
   InterpolateUnconnected(orientations, orientations.cam_from_world);
+  orientations.inlier_edges =
+      CountInlierEdges(orientations.graph, orientations.cam_from_world, options.averaging);
   orientations.breaks = FindBreaks(orientations.graph, orientations.cam_from_world);
   progress.EndStage(std::to_string(num_frames) + " frames, " +
                     std::to_string(orientations.graph.edges().size()) + " edges");
@@ -106,6 +119,30 @@ Trajectory RotationTrajectory(const Orientations& orientations) {
                           Eigen::Vector3d::Zero()});
   }
   return trajectory;
+}
+
+std::vector<RotationRow> RotationRows(const Orientations& orientations) {
+  std::vector<RotationRow> rows;
+  rows.reserve(orientations.cam_from_world.size());
+  for (const auto& [frame, cam_from_world] : orientations.cam_from_world) {
+    RotationRow& row = rows.emplace_back();
+    row.frame = frame.value;
+    row.timestamp_s = orientations.timestamps_s[frame.value];
+    row.world_from_cam = cam_from_world.Inverse();
+    row.inlier_edges = orientations.inlier_edges.at(frame);
+    if (const auto known = orientations.covariance.find(frame);
+        known != orientations.covariance.end()) {
+      row.sigma_deg = known->second.diagonal().cwiseSqrt() * kDegFromRad;
+    }
+    const FrameReport& report = orientations.reports[frame.value];
+    if (orientations.graph.EdgesOf(frame).empty()) row.flags.emplace_back("predicted");
+    if (report.weak) row.flags.emplace_back("weak");
+    if (report.searched_wide) row.flags.emplace_back("searched_wide");
+    if (std::binary_search(orientations.breaks.begin(), orientations.breaks.end(), frame)) {
+      row.flags.emplace_back("break");
+    }
+  }
+  return rows;
 }
 
 }  // namespace rotslam

@@ -1,9 +1,11 @@
 #pragma once
 
+#include <map>
 #include <vector>
 
 #include "apps/input.h"
 #include "apps/progress.h"
+#include "output/rotations_csv.h"
 #include "rotodom/odometry.h"
 #include "rotodom/types/trajectory.h"
 
@@ -18,6 +20,9 @@ struct Orientations : OdometryResult {
   // Frames that match later frames but none before them: a new piece of the view-graph, whose turn
   // against the piece before is extrapolated.
   std::vector<FrameId> breaks;
+  OdometrySeconds seconds;
+  std::vector<FrameReport> reports;     // by frame id
+  std::map<FrameId, int> inlier_edges;  // edges that agree with the frame's orientation
 };
 
 /// Reads the sequence to its end and finds every frame's orientation. Frames that could not be
@@ -25,6 +30,7 @@ struct Orientations : OdometryResult {
 /// std::runtime_error when there are fewer than three frames or no two of them match.
 Orientations FindOrientations(Input& input,
                               const OdometryOptions& options,
+                              bool keep_features,
                               const CommonFlags& flags,
                               Progress& progress);
 
@@ -34,5 +40,10 @@ void InterpolateUnconnected(const Orientations& orientations, RotationMap& cam_f
 
 /// Camera->world poses from orientations alone, positions zero.
 Trajectory RotationTrajectory(const Orientations& orientations);
+
+/// The lines of rotations.csv. Flags: `predicted` (matches no other frame, interpolated), `weak`
+/// (its best edge has fewer inliers than asked for), `searched_wide` (the prediction did not guide
+/// the matching), `break` (matches none before it).
+std::vector<RotationRow> RotationRows(const Orientations& orientations);
 
 }  // namespace rotslam

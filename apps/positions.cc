@@ -160,7 +160,10 @@ RotationMap FollowMap(const ViewGraph& graph,
     rotations[frame] = rotation;
     free_views.erase(frame);
   }
-  return AverageRotations(graph, std::move(rotations), free_views, options);
+  for (const auto& [frame, rotation] : AverageRotations(graph, rotations, free_views, options)) {
+    rotations[frame] = rotation;
+  }
+  return rotations;
 }
 
 // Position between the nearest frames that have one, linear in time.

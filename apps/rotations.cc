@@ -1,5 +1,6 @@
 #include <chrono>
 #include <memory>
+#include <string>
 
 #include "apps/command.h"
 #include "apps/orientations.h"
@@ -13,26 +14,28 @@ namespace {
 struct RotationsFlags {
   CommonFlags common;
   InputFlags input;
+  std::string averaging;  // empty: as the configuration says
 };
 
 int FindAndWriteRotations(const RotationsFlags& flags) {
   const auto start = std::chrono::steady_clock::now();
   Progress progress(flags.common.quiet);
   // The whole pipeline's options, so that one configuration file serves `run` and `rotations`.
-  const PipelineOptions options = ReadPipelineOptions(flags.common, flags.input);
+  PipelineOptions options = ReadPipelineOptions(flags.common, flags.input);
+  if (!flags.averaging.empty()) options.rotodom.averaging.mode = flags.averaging;
 
   Input input = OpenInput(
       flags.input, options.sequence, [&](const std::string& line) { progress.Say(line); });
   const std::filesystem::path directory = PrepareRunDirectory(flags.input.out);
   const Orientations orientations =
-      FindOrientations(input, options.rotodom, flags.common, progress);
+      FindOrientations(input, options.rotodom, false, flags.common, progress);
   WriteOrientations(directory, orientations);
   RunSummary summary = StartSummary("rotations", input, orientations, DescribeOptions(options));
-  summary.seconds = {
-      {"total", std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count()}};
+  summary.seconds.push_back(
+      {"total", std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count()});
   WriteSummary(directory / "summary.json", summary);
   progress.Say("wrote " + (directory / "rotations_tum.txt").string() +
-               ", view_graph.g2o, summary.json");
+               ", rotations.csv, view_graph.g2o, summary.json");
   return 0;
 }
 
@@ -44,6 +47,12 @@ void AddRotationsCommand(CLI::App& app, Action& action) {
       "rotations",
       "Every frame's orientation from a sequence, without positions (rotational odometry)");
   AddInputFlags(*command, flags->input);
+  command
+      ->add_option("--averaging",
+                   flags->averaging,
+                   "What is averaged at every frame: off (orientations are chained), window (the "
+                   "newest ones; default) or global (all; the time grows with the sequence)")
+      ->check(CLI::IsMember({"off", "window", "global"}));
   AddCommonFlags(*command, flags->common);
   command->footer("Example: rotslam rotations footage.mp4 --camera phone.yaml --out runs/footage");
   command->callback(

@@ -34,7 +34,7 @@ int Run(const RunFlags& flags) {
       flags.input, options.sequence, [&](const std::string& line) { progress.Say(line); });
   const std::filesystem::path directory = PrepareRunDirectory(flags.input.out);
   const Orientations orientations =
-      FindOrientations(input, options.rotodom, flags.common, progress);
+      FindOrientations(input, options.rotodom, true, flags.common, progress);
   WriteOrientations(directory, orientations);
   const double orientations_s = SecondsSince(start);
 
@@ -45,8 +45,9 @@ int Run(const RunFlags& flags) {
 
   RunSummary summary = StartSummary("run", input, orientations, DescribeOptions(options));
   AddPositions(positions, input.camera, summary);
-  summary.seconds = {
-      {"orientations", orientations_s}, {"positions", positions_s}, {"total", SecondsSince(start)}};
+  summary.seconds.push_back({"orientations", orientations_s});
+  summary.seconds.push_back({"positions", positions_s});
+  summary.seconds.push_back({"total", SecondsSince(start)});
   WriteSummary(directory / "summary.json", summary);
 
   for (std::size_t k = 1; k < positions.components.size(); ++k) {
@@ -58,9 +59,10 @@ int Run(const RunFlags& flags) {
     progress.Warn(
         "the camera never leaves its place, so there are no positions and no points to find");
   }
-  progress.Say("wrote " + directory.string() +
-               ": trajectory_tum.txt, trajectory_kitti.txt, keyframes_tum.txt, "
-               "rotations_tum.txt, cloud.ply, segments.csv, view_graph.g2o, summary.json");
+  progress.Say(
+      "wrote " + directory.string() +
+      ": trajectory_tum.txt, trajectory_kitti.txt, keyframes_tum.txt, "
+      "rotations_tum.txt, rotations.csv, cloud.ply, segments.csv, view_graph.g2o, summary.json");
   if (positions.failure.empty()) return 0;
   throw std::runtime_error("orientations are in " + directory.string() +
                            ", positions are not: " + positions.failure);

@@ -10,6 +10,7 @@
 #include "output/atomic_file.h"
 #include "output/g2o.h"
 #include "output/ply.h"
+#include "output/rotations_csv.h"
 #include "output/segments.h"
 #include "output/trajectory.h"
 
@@ -81,6 +82,7 @@ std::filesystem::path PrepareRunDirectory(const std::string& out) {
 
 void WriteOrientations(const std::filesystem::path& directory, const Orientations& orientations) {
   WriteTumTrajectory(directory / "rotations_tum.txt", RotationTrajectory(orientations));
+  WriteRotationsCsv(directory / "rotations.csv", RotationRows(orientations));
   WriteG2o(directory / "view_graph.g2o", {orientations.graph, orientations.cam_from_world, {}});
 }
 
@@ -115,12 +117,17 @@ RunSummary StartSummary(const std::string& command,
                       {"camera_file", input.camera_file},
                       {"first_timestamp_s", orientations.timestamps_s.front()},
                       {"last_timestamp_s", orientations.timestamps_s.back()}};
-  summary.counts = {{"frames", count(orientations.timestamps_s.size())},
-                    {"unreadable_frames", std::int64_t{orientations.num_unreadable}},
-                    {"frames_without_edge", std::int64_t{orientations.num_predicted}},
-                    {"frames_with_weak_edge", std::int64_t{orientations.num_weak}},
-                    {"breaks", count(orientations.breaks.size())},
-                    {"edges", count(orientations.graph.edges().size())}};
+  summary.counts = {
+      {"frames", count(orientations.timestamps_s.size())},
+      {"unreadable_frames", std::int64_t{orientations.num_unreadable}},
+      {"frames_without_edge", std::int64_t{orientations.num_predicted}},
+      {"frames_with_weak_edge", std::int64_t{orientations.num_weak}},
+      {"frames_searched_wide",
+       count(std::count_if(orientations.reports.begin(),
+                           orientations.reports.end(),
+                           [](const FrameReport& report) { return report.searched_wide; }))},
+      {"breaks", count(orientations.breaks.size())},
+      {"edges", count(orientations.graph.edges().size())}};
   double inliers = 0.0;
   std::int64_t rotation_only = 0;
   for (const RelativeRotation& edge : orientations.graph.edges()) {
@@ -130,6 +137,13 @@ RunSummary StartSummary(const std::string& command,
   summary.rotodom = SummaryTable{
       {"mean_inliers_per_edge", inliers / static_cast<double>(orientations.graph.edges().size())},
       {"rotation_only_edges", rotation_only}};
+  const OdometrySeconds& seconds = orientations.seconds;
+  summary.seconds = {{"pyramid", seconds.pyramid},
+                     {"tracking", seconds.tracking},
+                     {"detection", seconds.detection},
+                     {"edges", seconds.edges},
+                     {"averaging", seconds.averaging},
+                     {"covariance", seconds.covariance}};
   return summary;
 }
 

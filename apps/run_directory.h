@@ -12,7 +12,7 @@ namespace rotslam {
 /// Throws std::runtime_error with path and reason.
 std::filesystem::path PrepareRunDirectory(const std::string& out);
 
-/// rotations_tum.txt and view_graph.g2o.
+/// rotations_tum.txt, rotations.csv and view_graph.g2o.
 void WriteOrientations(const std::filesystem::path& directory, const Orientations& orientations);
 
 /// trajectory_tum.txt, trajectory_kitti.txt, keyframes_tum.txt, cloud.ply and segments.csv.

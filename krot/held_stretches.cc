@@ -1,5 +1,6 @@
 #include "krot/held_stretches.h"
 
+#include <limits>
 #include <stdexcept>
 
 #include "rotodom/types/options.h"
@@ -7,16 +8,16 @@
 namespace rotslam {
 namespace {
 
-// Of the edges across the step from frame n-1 to frame n: the span of the longest, and how many of
-// that span there are and show no baseline.
+// Of the edges across the step from frame n-1 to frame n, those of the highest rank: how many there
+// are and how many of them show no baseline.
 struct Evidence {
-  int span = 0;
+  int rank = std::numeric_limits<int>::min();
   int edges = 0;
   int rotation_only = 0;
 
-  void Add(int edge_span, bool edge_rotation_only) {
-    if (edge_span < span) return;
-    if (edge_span > span) *this = {edge_span, 0, 0};
+  void Add(int edge_rank, bool edge_rotation_only) {
+    if (edge_rank < rank) return;
+    if (edge_rank > rank) *this = {edge_rank, 0, 0};
     ++edges;
     rotation_only += edge_rotation_only;
   }
@@ -29,6 +30,7 @@ std::optional<std::string> HeldStretchOptions::Problem() const {
   if (!(min_rotation_only_ratio > 0.0 && min_rotation_only_ratio <= 1.0)) {
     return OutOfRange("min_rotation_only_ratio", min_rotation_only_ratio, "above 0 and at most 1");
   }
+  if (max_edge_span < 1) return OutOfRange("max_edge_span", max_edge_span, "at least 1");
   if (min_frames < 2) return OutOfRange("min_frames", min_frames, "at least 2");
   return std::nullopt;
 }
@@ -52,7 +54,10 @@ std::vector<HeldStretch> FindHeldStretches(const ViewGraph& graph,
     }
     const int first = position.at(edge.i);
     const int last = position.at(edge.j);
-    for (int n = first + 1; n <= last; ++n) steps[n].Add(last - first, edge.rotation_only);
+    // Long edges before short ones, but not too long ones.
+    const int span = last - first;
+    const int rank = span <= options.max_edge_span ? span : -span;
+    for (int n = first + 1; n <= last; ++n) steps[n].Add(rank, edge.rotation_only);
   }
   std::vector<HeldStretch> stretches;
   const int count = static_cast<int>(frames.size());

@@ -16,6 +16,9 @@ struct HeldStretchOptions {
   // A step from one frame to the next is held when at least this share of the longest edges across
   // it are rotation-only; a slow camera shows its baseline in those first.
   double min_rotation_only_ratio = 0.5;
+  // Edges across more frames than this are asked only where there are no others: where a keyframe
+  // is followed for long they reach beyond the stretch, to where the camera still moved.
+  int max_edge_span = 4;
   // Shorter runs than this, in frames, are left alone: a hand-held camera pauses that long.
   int min_frames = 8;
 
@@ -25,6 +28,7 @@ struct HeldStretchOptions {
   void Visit(Visitor&& visit) {
     visit("enabled", enabled);
     visit("min_rotation_only_ratio", min_rotation_only_ratio);
+    visit("max_edge_span", max_edge_span);
     visit("min_frames", min_frames);
   }
 };

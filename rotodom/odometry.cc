@@ -1,6 +1,7 @@
 #include "rotodom/odometry.h"
 
 #include <algorithm>
+#include <chrono>
 #include <iterator>
 #include <stdexcept>
 
@@ -9,35 +10,76 @@
 namespace rotslam {
 namespace {
 
-// Positions of the same corner that differ by more than this are not averaged.
-constexpr double kSameCornerPx = 1.0;
+// Two measurements of one rotation, the rougher by unrefined corners, differ by less.
+constexpr double kSameRotationDeg = 3.0;
 
-// Gives every keypoint of `features` that a connection has located the mean of those positions, so
-// that a track follows one point of the scene instead of the detector's grid.
-void SharpenKeypoints(const std::vector<Connection>& connections,
-                      const Camera& camera,
-                      Features& features) {
-  std::vector<Eigen::Vector2d> first(features.size());
-  std::vector<Eigen::Vector2d> sum(features.size(), Eigen::Vector2d::Zero());
-  std::vector<int> count(features.size(), 0);
+// Adds the time until it goes out of scope.
+class Stopwatch {
+ public:
+  explicit Stopwatch(double& seconds) : seconds_(seconds) {}
+  ~Stopwatch() {
+    seconds_ += std::chrono::duration<double>(std::chrono::steady_clock::now() - start_).count();
+  }
+  Stopwatch(const Stopwatch&) = delete;
+  Stopwatch& operator=(const Stopwatch&) = delete;
+
+ private:
+  double& seconds_;
+  std::chrono::steady_clock::time_point start_ = std::chrono::steady_clock::now();
+};
+
+const Connection* BestOf(const std::vector<Connection>& connections) {
+  const auto best = std::max_element(
+      connections.begin(), connections.end(), [](const Connection& a, const Connection& b) {
+        return a.edge.num_inliers < b.edge.num_inliers;
+      });
+  return best == connections.end() ? nullptr : &*best;
+}
+
+// Whether enough of the points that both views show agree on the edge.
+bool IsBelieved(const Connection& connection, double min_inlier_ratio) {
+  const double num_common =
+      connection.edge.num_inliers + static_cast<double>(connection.outliers_j.size());
+  return connection.edge.num_inliers > min_inlier_ratio * num_common;
+}
+
+// A point that more edges refute than confirm is followed no longer.
+void MarkLostPoints(const std::vector<Connection>& connections, View& view) {
+  std::vector<int> votes(view.features.size(), 0);
   for (const Connection& connection : connections) {
-    for (std::size_t k = 0; k < connection.keypoint_j_px.size(); ++k) {
-      const int index = connection.matches.pairs[k][1];
-      const Eigen::Vector2d& position = connection.keypoint_j_px[k];
-      if (count[index] == 0) first[index] = position;
-      if ((position - first[index]).norm() > kSameCornerPx) continue;
-      sum[index] += position;
-      ++count[index];
-    }
+    for (const auto& [i, j] : connection.matches.pairs) ++votes[j];
+    for (const int j : connection.outliers_j) --votes[j];
   }
-  for (int index = 0; index < features.size(); ++index) {
-    if (count[index] == 0) continue;
-    const Eigen::Vector2d position = sum[index] / count[index];
-    const auto bearing = camera.Unproject(position);
-    if (!bearing) continue;
-    features.keypoints_px[index] = position;
-    features.bearings[index] = *bearing;
+  view.is_lost.assign(view.features.size(), false);
+  for (std::size_t n = 0; n < votes.size(); ++n) view.is_lost[n] = votes[n] < 0;
+}
+
+// What a keypoint sees, as if its row had been exposed in the middle of the frame.
+// @param rate           of the camera's rotation, rad/s in camera axes.
+// @param flow_px_per_s  motion of the keypoint beside that.
+std::optional<Eigen::Vector3d> BearingOf(const Eigen::Vector2d& keypoint_px,
+                                         const Camera& camera,
+                                         const Eigen::Vector3d& rate,
+                                         const Eigen::Vector2d& flow_px_per_s) {
+  if (camera.readout_s == 0.0) return camera.Unproject(keypoint_px);
+  const double late_s = camera.RowTime(keypoint_px.y());
+  const auto bearing = camera.Unproject(keypoint_px - late_s * flow_px_per_s);
+  if (!bearing) return std::nullopt;
+  return Rotation::Exp(-late_s * rate) * *bearing;
+}
+
+// Gives later stages, which know of no shutter, the keypoints that a global one would have seen.
+void MoveToBearings(const Camera& camera, Features& features) {
+  for (int n = 0; n < features.size(); ++n) {
+    const auto keypoint_px = camera.Project(features.bearings[n]);
+    if (keypoint_px) features.keypoints_px[n] = *keypoint_px;
   }
+}
+
+// A radian and more means that nothing is known.
+std::optional<Eigen::Matrix3d> UnlessUnknown(std::optional<Eigen::Matrix3d> covariance) {
+  if (!covariance || covariance->trace() > 3.0) return std::nullopt;
+  return covariance;
 }
 
 }  // namespace
@@ -45,6 +87,7 @@ void SharpenKeypoints(const std::vector<Connection>& connections,
 std::optional<std::string> OdometryOptions::Problem() const {
   if (auto problem = ProblemIn("features", features)) return problem;
   if (auto problem = ProblemIn("matching", matching)) return problem;
+  if (auto problem = ProblemIn("tracking", tracking)) return problem;
   if (auto problem = ProblemIn("relative_rotation", relative_rotation)) return problem;
   if (auto problem = ProblemIn("view_graph", view_graph)) return problem;
   return ProblemIn("averaging", averaging);
@@ -54,13 +97,19 @@ RotationalOdometry::RotationalOdometry(const Camera& camera,
                                        const OdometryOptions& options,
                                        std::uint64_t seed,
                                        int num_threads)
-    : camera_(camera), options_(options), seed_(seed), num_threads_(num_threads) {
+    : camera_(camera),
+      options_(options),
+      seed_(seed),
+      num_threads_(num_threads),
+      covariance_(options.averaging) {
   if (const auto problem = camera.Problem()) throw std::invalid_argument("camera: " + *problem);
   if (const auto problem = options.Problem()) throw std::invalid_argument("options: " + *problem);
 }
 
-FrameReport RotationalOdometry::AddFrame(FrameId frame, double timestamp_s, const cv::Mat& image) {
-  if (!result_.cam_from_world.empty() && frame <= result_.cam_from_world.rbegin()->first) {
+FrameEstimate RotationalOdometry::AddFrame(FrameId frame,
+                                           double timestamp_s,
+                                           const cv::Mat& image) {
+  if (!cam_from_world_.empty() && frame <= cam_from_world_.rbegin()->first) {
     throw std::invalid_argument("RotationalOdometry: frame ids must ascend");
   }
   if (!timestamps_s_.empty() && !(timestamp_s > timestamps_s_.rbegin()->second)) {
@@ -70,52 +119,64 @@ FrameReport RotationalOdometry::AddFrame(FrameId frame, double timestamp_s, cons
   if (sized && !image.empty() && (image.cols != camera_.width || image.rows != camera_.height)) {
     throw std::invalid_argument("RotationalOdometry: the image has not the camera's size");
   }
-  FrameReport report;
-  report.frame = frame;
-  result_.cam_from_world[frame] = PredictOrientation(timestamp_s);
-  timestamps_s_[frame] = timestamp_s;
+  FrameEstimate estimate;
+  estimate.frame = frame;
+  estimate.timestamp_s = timestamp_s;
+  estimate.cam_from_world = PredictOrientation(timestamp_s);
   if (image.empty()) {
-    report.predicted_only = true;
-    return report;
+    estimate.report.predicted_only = true;
+    cam_from_world_[frame] = estimate.cam_from_world;
+    timestamps_s_[frame] = timestamp_s;
+    AverageWindow(estimate);
+    UpdateCovariance(estimate);
+    Forget();
+    return estimate;
   }
 
-  View view;
-  view.features = ExtractFeatures(image, frame, camera_, options_.features, num_threads_);
-  view.pyramid = BuildPatchPyramid(ToGrey(image), options_.matching);
-  report.num_features = view.features.size();
+  const auto view = std::make_shared<View>();
+  view->timestamp_s = timestamp_s;
+  view->features.frame = frame;
+  view->pyramid = BuildPyramidOf(image);
 
-  std::vector<const View*> others;
-  for (auto other = recent_.rbegin(); other != recent_.rend(); ++other) others.push_back(&*other);
-  ConnectOptions connect_options{
-      options_.features, options_.matching, options_.relative_rotation, seed_, num_threads_};
-  std::vector<Connection> connections =
-      ConnectView(view, others, result_.cam_from_world, camera_, connect_options);
-  KeepGoodConnections(connections, report);
-  SharpenKeypoints(connections, camera_, view.features);
+  const std::vector<OrientedView> recent = RecentViews();
+  const TrackingTarget target{&view->pyramid,
+                              timestamp_s,
+                              estimate.cam_from_world,
+                              RotationRate(timestamp_s, estimate.cam_from_world),
+                              nullptr,
+                              options_.features.max_features};
+  const TrackingResult tracked = Track(recent, target, estimate);
+  const Eigen::Vector3d rate = RotationRate(timestamp_s, tracked.cam_from_world);
+  if (camera_.readout_s > 0.0) ReviseNewestView(timestamp_s, tracked.cam_from_world, estimate);
+  CarryOn(tracked, recent, rate, view->features);
+  estimate.report.num_tracked = view->features.size();
+  DetectNewFeatures(image, rate, *view);
 
-  report.predicted_only = connections.empty() && result_.cam_from_world.size() > 1;
-  StartFromBestEdge(frame, connections);
-  for (Connection& connection : connections) {
-    result_.graph.AddEdge(connection.edge);
-    result_.edge_matches.push_back(std::move(connection.matches));
-  }
-  AverageWindow();
+  cam_from_world_[frame] = tracked.cam_from_world;
+  timestamps_s_[frame] = timestamp_s;
+  Connect(*view, estimate);
+  MarkLostPoints(estimate.connections, *view);
+  KeepGoodConnections(estimate);
+  AverageWindow(estimate);
+  UpdateCovariance(estimate);
+  Forget();
+  UpdateFlow(tracked, recent, *view);
 
-  Features kept = view.features;
-  kept.descriptors.release();
-  result_.features[frame] = std::move(kept);
-  // A black or blurred frame is no partner for the next ones; those before it may still be.
-  if (view.features.size() >= options_.relative_rotation.min_inliers) {
-    recent_.push_back(std::move(view));
-    if (static_cast<int>(recent_.size()) > options_.view_graph.window_frames) recent_.pop_front();
-  }
-  return report;
+  estimate.features = view->features;
+  if (camera_.readout_s > 0.0) MoveToBearings(camera_, estimate.features);
+  Remember(view);
+  return estimate;
+}
+
+ImagePyramid RotationalOdometry::BuildPyramidOf(const cv::Mat& image) {
+  const Stopwatch stopwatch(seconds_.pyramid);
+  return BuildPyramid(ToGrey(image), options_.features);
 }
 
 Rotation RotationalOdometry::PredictOrientation(double timestamp_s) const {
-  if (result_.cam_from_world.empty()) return Rotation();
-  const auto last = std::prev(result_.cam_from_world.end());
-  if (last == result_.cam_from_world.begin()) return last->second;
+  if (cam_from_world_.empty()) return Rotation();
+  const auto last = std::prev(cam_from_world_.end());
+  if (last == cam_from_world_.begin()) return last->second;
   const auto before = std::prev(last);
   const double step_s = timestamps_s_.at(last->first) - timestamps_s_.at(before->first);
   const double ahead_s = timestamp_s - timestamps_s_.at(last->first);
@@ -125,49 +186,352 @@ Rotation RotationalOdometry::PredictOrientation(double timestamp_s) const {
   return Rotation::Exp(steps * turn.Log()) * last->second;
 }
 
-void RotationalOdometry::KeepGoodConnections(std::vector<Connection>& connections,
-                                             FrameReport& report) const {
-  const auto fewer_inliers = [](const Connection& a, const Connection& b) {
-    return a.edge.num_inliers < b.edge.num_inliers;
+Eigen::Vector3d RotationalOdometry::RotationRate(double timestamp_s,
+                                                 const Rotation& cam_from_world) const {
+  if (cam_from_world_.empty()) return Eigen::Vector3d::Zero();
+  const auto last = std::prev(cam_from_world_.end());
+  return (cam_from_world * last->second.Inverse()).Log() /
+         (timestamp_s - timestamps_s_.at(last->first));
+}
+
+std::vector<OrientedView> RotationalOdometry::RecentViews() const {
+  std::vector<OrientedView> views;
+  for (const std::shared_ptr<View>& view : recent_) {
+    views.push_back({view.get(), cam_from_world_.at(view->features.frame)});
+  }
+  return views;
+}
+
+TrackingResult RotationalOdometry::Track(const std::vector<OrientedView>& views,
+                                         const TrackingTarget& target,
+                                         FrameEstimate& estimate) {
+  const Stopwatch stopwatch(seconds_.tracking);
+  TrackingResult tracked = TrackPoints(views, target, camera_, options_.tracking, num_threads_);
+  if (views.empty() || !tracked.IsPoor(options_.tracking)) return tracked;
+  const auto recovery = RecoverMotion(views,
+                                      target,
+                                      camera_,
+                                      {options_.features,
+                                       options_.matching,
+                                       options_.relative_rotation,
+                                       options_.tracking,
+                                       seed_,
+                                       num_threads_});
+  estimate.report.searched_wide = true;
+  TrackingResult best;
+  best.cam_from_world = target.cam_from_world;
+  int most_agreeing = 0;
+  const auto consider = [&](TrackingResult&& candidate) {
+    const Agreement agreement = AgreementOf(candidate, views);
+    if (agreement.num_points <= most_agreeing) return;
+    // Patches that look alike can be found in the wrong places all together; descriptors, sought
+    // everywhere, are another witness.
+    const Rotation doubt =
+        recovery ? agreement.cam_from_world * recovery->cam_from_world.Inverse() : Rotation();
+    if (doubt.AngleDeg() > kSameRotationDeg) return;
+    most_agreeing = agreement.num_points;
+    best = std::move(candidate);
   };
-  const auto best = std::max_element(connections.begin(), connections.end(), fewer_inliers);
-  if (best == connections.end()) return;
-  report.num_inliers = best->edge.num_inliers;
-  report.searched_wide =
-      std::any_of(connections.begin(), connections.end(), [](const Connection& c) {
-        return c.range != SearchRange::kGuided;
+  consider(std::move(tracked));
+  if (recovery) {
+    TrackingTarget corrected = target;
+    corrected.cam_from_world = recovery->guide_cam_from_world;
+    corrected.flow = &recovery->flow;
+    consider(TrackPoints(views, corrected, camera_, options_.tracking, num_threads_));
+    consider({recovery->cam_from_world, recovery->points, 0});
+  }
+  return best;
+}
+
+RotationalOdometry::Agreement RotationalOdometry::AgreementOf(
+    const TrackingResult& tracked, const std::vector<OrientedView>& views) const {
+  Agreement most;
+  for (int v = 0; v < static_cast<int>(views.size()); ++v) {
+    std::vector<BearingPair> pairs;
+    for (const TrackedPoint& point : tracked.points) {
+      if (point.view != v) continue;
+      if (const auto bearing = camera_.Unproject(point.keypoint_px)) {
+        pairs.push_back({views[v].view->features.bearings[point.index], *bearing});
+      }
+    }
+    const auto estimate =
+        EstimateRelativeRotation(pairs,
+                                 tracked.cam_from_world * views[v].cam_from_world.Inverse(),
+                                 camera_.MeanFocal(),
+                                 options_.relative_rotation,
+                                 seed_);
+    if (!estimate) continue;
+    const int agreeing = static_cast<int>(estimate->inliers.size());
+    const double ratio = static_cast<double>(agreeing) / static_cast<double>(pairs.size());
+    if (ratio <= options_.view_graph.min_inlier_ratio || agreeing <= most.num_points) continue;
+    most = {agreeing, estimate->j_from_i * views[v].cam_from_world};
+  }
+  return most;
+}
+
+void RotationalOdometry::CarryOn(const TrackingResult& tracked,
+                                 const std::vector<OrientedView>& views,
+                                 const Eigen::Vector3d& rate,
+                                 Features& features) const {
+  for (const TrackedPoint& point : tracked.points) {
+    const View& view = *views[point.view].view;
+    const auto bearing =
+        BearingOf(point.keypoint_px, camera_, rate, view.flow_px_per_s[point.index]);
+    if (!bearing) continue;
+    const Features& from = view.features;
+    features.keypoints_px.push_back(point.keypoint_px);
+    features.bearings.push_back(*bearing);
+    features.levels.push_back(from.levels[point.index]);
+    features.rgb.push_back(from.rgb[point.index]);
+    features.tracks.push_back(point.track);
+    features.covariances_px.emplace_back(point.covariance_px.cast<float>());
+  }
+}
+
+void RotationalOdometry::DetectNewFeatures(const cv::Mat& image,
+                                           const Eigen::Vector3d& rate,
+                                           View& view) {
+  const Stopwatch stopwatch(seconds_.detection);
+  Features& features = view.features;
+  const int num_tracked = features.size();
+  DetectFeatures(view.pyramid, camera_, options_.features, num_threads_, features);
+  ColourFeatures(image, features, num_tracked);
+  for (int n = num_tracked; n < features.size(); ++n) {
+    features.tracks.push_back(TrackId{next_track_++});
+    // Its place is its patch's: it errs only where the patch is found again.
+    features.covariances_px.emplace_back(Eigen::Matrix2f::Zero());
+    if (camera_.readout_s == 0.0) continue;
+    if (const auto bearing =
+            BearingOf(features.keypoints_px[n], camera_, rate, Eigen::Vector2d::Zero())) {
+      features.bearings[n] = *bearing;
+    }
+  }
+}
+
+void RotationalOdometry::ReviseNewestView(double timestamp_s,
+                                          const Rotation& next_from_world,
+                                          FrameEstimate& estimate) {
+  if (recent_.size() < 2) return;
+  const Stopwatch stopwatch(seconds_.edges);
+  View& view = *recent_.front();
+  const FrameId frame = view.features.frame;
+  // The rate at the newest view can now be told from both sides.
+  const auto here = cam_from_world_.find(frame);
+  if (here == cam_from_world_.begin()) return;
+  const auto before = std::prev(here);
+  const Eigen::Vector3d rate = (next_from_world * before->second.Inverse()).Log() /
+                               (timestamp_s - timestamps_s_.at(before->first));
+  for (int n = 0; n < view.features.size(); ++n) {
+    const auto bearing =
+        BearingOf(view.features.keypoints_px[n], camera_, rate, view.flow_px_per_s[n]);
+    if (bearing) view.features.bearings[n] = *bearing;
+  }
+  estimate.revised_features = view.features;
+  MoveToBearings(camera_, *estimate.revised_features);
+  std::vector<const Features*> partners;
+  for (const int index : graph_.EdgesOf(frame)) {
+    const FrameId other = graph_.edges()[index].i;
+    if (other == frame) continue;
+    for (const auto* views : {&recent_, &keyframes_}) {
+      const auto partner = std::find_if(views->begin(), views->end(), [&](const auto& candidate) {
+        return candidate->features.frame == other;
       });
-  report.weak = best->edge.num_inliers <= options_.view_graph.min_edge_inliers;
-  if (report.weak) {
-    connections = {std::move(*best)};
+      if (partner == views->end()) continue;
+      partners.push_back(&(*partner)->features);
+      break;
+    }
+  }
+  for (const Connection& connection : MeasureEdges(view.features, partners)) {
+    if (!IsBelieved(connection, options_.view_graph.min_inlier_ratio)) continue;
+    graph_.AddEdge(connection.edge);
+    estimate.revised_edges.push_back(connection.edge);
+  }
+}
+
+void RotationalOdometry::Connect(const View& view, FrameEstimate& estimate) {
+  const Stopwatch stopwatch(seconds_.edges);
+  estimate.connections = MeasureEdges(view.features, Partners(view));
+}
+
+std::vector<Connection> RotationalOdometry::MeasureEdges(
+    const Features& view, const std::vector<const Features*>& partners) const {
+  return ConnectView(view,
+                     partners,
+                     cam_from_world_,
+                     camera_.MeanFocal(),
+                     {options_.relative_rotation, seed_, num_threads_});
+}
+
+std::vector<const Features*> RotationalOdometry::Partners(const View& view) const {
+  std::vector<const Features*> partners;
+  for (const std::shared_ptr<View>& recent : recent_) partners.push_back(&recent->features);
+  const auto num_recent = partners.size();
+  // The oldest keyframes reach furthest.
+  for (auto keyframe = keyframes_.rbegin(); keyframe != keyframes_.rend(); ++keyframe) {
+    const auto num_keyframes = partners.size() - num_recent;
+    if (num_keyframes >= static_cast<std::size_t>(options_.view_graph.max_keyframe_edges)) break;
+    const bool is_recent = std::find(recent_.begin(), recent_.end(), *keyframe) != recent_.end();
+    if (is_recent || CountCommonTracks((*keyframe)->features, view.features) <=
+                         options_.view_graph.min_edge_inliers) {
+      continue;
+    }
+    partners.push_back(&(*keyframe)->features);
+  }
+  return partners;
+}
+
+void RotationalOdometry::KeepGoodConnections(FrameEstimate& estimate) const {
+  std::vector<Connection>& connections = estimate.connections;
+  std::erase_if(connections, [&](const Connection& connection) {
+    return !IsBelieved(connection, options_.view_graph.min_inlier_ratio);
+  });
+  const int min_inliers = options_.view_graph.min_edge_inliers;
+  const Connection* best = BestOf(connections);
+  estimate.report.predicted_only = best == nullptr && cam_from_world_.size() > 1;
+  if (best == nullptr) return;
+  estimate.report.num_inliers = best->edge.num_inliers;
+  estimate.report.weak = best->edge.num_inliers <= min_inliers;
+  if (estimate.report.weak) {
+    connections = {Connection(*best)};
   } else {
     std::erase_if(connections, [&](const Connection& connection) {
-      return connection.edge.num_inliers <= options_.view_graph.min_edge_inliers;
+      return connection.edge.num_inliers <= min_inliers;
     });
   }
-  report.num_edges = static_cast<int>(connections.size());
 }
 
-void RotationalOdometry::StartFromBestEdge(FrameId frame,
-                                           const std::vector<Connection>& connections) {
-  const auto best = std::max_element(
-      connections.begin(), connections.end(), [](const Connection& a, const Connection& b) {
-        return a.edge.num_inliers < b.edge.num_inliers;
-      });
-  if (best == connections.end()) return;
-  result_.cam_from_world[frame] = best->edge.j_from_i * result_.cam_from_world.at(best->edge.i);
-}
-
-void RotationalOdometry::AverageWindow() {
-  std::set<FrameId> window;
-  for (auto entry = result_.cam_from_world.rbegin(); entry != result_.cam_from_world.rend();
-       ++entry) {
-    if (static_cast<int>(window.size()) == options_.averaging.window) break;
-    // The first frame defines the world.
-    if (entry->first != result_.cam_from_world.begin()->first) window.insert(entry->first);
+void RotationalOdometry::AverageWindow(FrameEstimate& estimate) {
+  const Stopwatch stopwatch(seconds_.averaging);
+  const Connection* best = BestOf(estimate.connections);
+  if (best != nullptr) {
+    cam_from_world_[estimate.frame] = best->edge.j_from_i * cam_from_world_.at(best->edge.i);
   }
-  result_.cam_from_world = AverageRotations(
-      result_.graph, std::move(result_.cam_from_world), window, options_.averaging);
+  for (const Connection& connection : estimate.connections) graph_.AddEdge(connection.edge);
+  const std::set<FrameId> free_views = ViewsToAverage(cam_from_world_, options_.averaging);
+  estimate.window = AverageRotations(graph_, cam_from_world_, free_views, options_.averaging);
+  estimate.window.try_emplace(estimate.frame, cam_from_world_.at(estimate.frame));
+  for (const auto& [frame, rotation] : estimate.window) cam_from_world_[frame] = rotation;
+  estimate.cam_from_world = cam_from_world_.at(estimate.frame);
+}
+
+void RotationalOdometry::UpdateCovariance(FrameEstimate& estimate) {
+  const Stopwatch stopwatch(seconds_.covariance);
+  std::set<FrameId> free_views = ViewsToAverage(cam_from_world_, options_.averaging);
+  const Connection* best = BestOf(estimate.connections);
+  std::vector<SupportedEdge> edges;
+  const bool is_chained = options_.averaging.mode == "off";
+  for (const Connection& connection : estimate.connections) {
+    if (is_chained && &connection != best) continue;
+    edges.push_back({connection.edge, connection.matches.pairs});
+  }
+  if (is_chained && best != nullptr) free_views = {estimate.frame};
+  while (static_cast<int>(free_views.size()) > options_.averaging.window) {
+    free_views.erase(free_views.begin());
+  }
+  covariance_.AddView(estimate.frame, edges, cam_from_world_, free_views);
+  estimate.covariance = CovarianceOf(estimate.frame);
+  // The view that the next frame will push out of the window has its last change behind it.
+  if (!free_views.empty()) {
+    estimate.settled = *free_views.begin();
+    estimate.settled_covariance = CovarianceOf(estimate.settled);
+  }
+}
+
+std::optional<Eigen::Matrix3d> RotationalOdometry::CovarianceOf(FrameId frame) const {
+  return UnlessUnknown(covariance_.Of(frame));
+}
+
+std::optional<Eigen::Matrix3d> RotationalOdometry::CovarianceBetween(FrameId i, FrameId j) const {
+  return UnlessUnknown(covariance_.Between(i, j));
+}
+
+void RotationalOdometry::Forget() {
+  if (options_.averaging.mode == "global") return;
+  // Now and then is enough: a multiple of what is needed is still bounded.
+  const std::size_t needed = static_cast<std::size_t>(options_.averaging.window) + 2;
+  if (cam_from_world_.size() < 4 * (needed + keyframes_.size())) return;
+  std::set<FrameId> kept;
+  for (const auto* views : {&recent_, &keyframes_}) {
+    for (const std::shared_ptr<View>& view : *views) kept.insert(view->features.frame);
+  }
+  const FrameId oldest_free =
+      std::prev(cam_from_world_.end(), static_cast<std::ptrdiff_t>(needed))->first;
+  ViewGraph graph;
+  for (const RelativeRotation& edge : graph_.edges()) {
+    if (edge.j < oldest_free) continue;
+    graph.AddEdge(edge);
+    kept.insert({edge.i, edge.j});
+  }
+  graph_ = std::move(graph);
+  std::erase_if(cam_from_world_, [&](const auto& entry) {
+    return entry.first < oldest_free && !kept.contains(entry.first);
+  });
+  std::erase_if(timestamps_s_,
+                [&](const auto& entry) { return !cam_from_world_.contains(entry.first); });
+}
+
+void RotationalOdometry::UpdateFlow(const TrackingResult& tracked,
+                                    const std::vector<OrientedView>& views,
+                                    View& view) const {
+  const cv::Mat& image = view.pyramid.levels.front();
+  FlowField field(image.cols, image.rows);
+  const Rotation& view_from_world = cam_from_world_.at(view.features.frame);
+  view.flow_px_per_s.assign(view.features.size(), Eigen::Vector2d::Zero());
+  std::size_t point = 0;
+  int n = 0;
+  for (; n < view.features.size(); ++n) {
+    while (point < tracked.points.size() && tracked.points[point].track < view.features.tracks[n]) {
+      ++point;
+    }
+    if (point == tracked.points.size()) break;
+    const TrackedPoint& from = tracked.points[point];
+    if (from.track != view.features.tracks[n] || view.is_lost[n]) continue;
+    const View& from_view = *views[from.view].view;
+    const Rotation& from_from_world = cam_from_world_.at(from_view.features.frame);
+    const auto turned_px = camera_.Project(
+        view_from_world * (from_from_world.Inverse() * from_view.features.bearings[from.index]));
+    const auto here_px = camera_.Project(view.features.bearings[n]);
+    if (!turned_px || !here_px) continue;
+    view.flow_px_per_s[n] = (*here_px - *turned_px) / (view.timestamp_s - from_view.timestamp_s);
+    field.Add(view.features.keypoints_px[n], view.flow_px_per_s[n]);
+  }
+  for (; n < view.features.size(); ++n) {
+    view.flow_px_per_s[n] = field.At(view.features.keypoints_px[n]);
+  }
+}
+
+void RotationalOdometry::Remember(std::shared_ptr<View> view) {
+  // A black or blurred frame is no partner for the next ones; those before it may still be.
+  if (view->features.size() < options_.relative_rotation.min_inliers) return;
+  const bool is_keyframe =
+      keyframes_.empty() || CountCommonTracks(keyframes_.front()->features, view->features) <
+                                options_.view_graph.keyframe_overlap * view->features.size();
+  if (is_keyframe) {
+    keyframes_.push_front(view);
+    if (static_cast<int>(keyframes_.size()) > options_.view_graph.max_keyframes) {
+      keyframes_.pop_back();
+    }
+  }
+  recent_.push_front(std::move(view));
+  if (static_cast<int>(recent_.size()) > options_.view_graph.window_frames) recent_.pop_back();
+}
+
+void OdometryResult::Add(FrameEstimate estimate, bool keep_features) {
+  for (const auto& [frame, rotation] : estimate.window) cam_from_world[frame] = rotation;
+  for (const RelativeRotation& edge : estimate.revised_edges) graph.AddEdge(edge);
+  for (Connection& connection : estimate.connections) {
+    graph.AddEdge(connection.edge);
+    if (keep_features) edge_matches.push_back(std::move(connection.matches));
+  }
+  if (keep_features) {
+    if (estimate.revised_features) {
+      const FrameId revised = estimate.revised_features->frame;
+      features[revised] = *std::move(estimate.revised_features);
+    }
+    features[estimate.frame] = std::move(estimate.features);
+  }
+  if (estimate.covariance) covariance[estimate.frame] = *estimate.covariance;
+  if (estimate.settled_covariance) covariance[estimate.settled] = *estimate.settled_covariance;
 }
 
 }  // namespace rotslam

@@ -2,12 +2,16 @@
 
 #include <deque>
 #include <map>
+#include <memory>
 #include <optional>
 #include <string>
 #include <utility>
 #include <vector>
 
 #include "rotodom/averaging/averaging.h"
+#include "rotodom/averaging/orientation_covariance.h"
+#include "rotodom/tracking/recovery.h"
+#include "rotodom/tracking/tracking.h"
 #include "rotodom/view_graph/connect.h"
 
 namespace rotslam {
@@ -15,6 +19,7 @@ namespace rotslam {
 struct OdometryOptions {
   FeatureOptions features;
   MatchingOptions matching;
+  TrackingOptions tracking;
   RelativeRotationOptions relative_rotation;
   ViewGraphOptions view_graph;
   AveragingOptions averaging;
@@ -25,34 +30,60 @@ struct OdometryOptions {
   void Visit(Visitor&& visit) {
     visit("features", features);
     visit("matching", matching);
+    visit("tracking", tracking);
     visit("relative_rotation", relative_rotation);
     visit("view_graph", view_graph);
     visit("averaging", averaging);
   }
 };
 
-/// What one frame brought.
+/// How well one frame did.
 struct FrameReport {
-  FrameId frame;
-  int num_features = 0;
-  int num_edges = 0;
+  int num_tracked = 0;          // features carried on from older frames
   int num_inliers = 0;          // of the best edge
-  bool predicted_only = false;  // no edge: the orientation is the constant-velocity prediction
+  bool predicted_only = false;  // no edge: the orientation is the prediction
   bool weak = false;            // its best edge has fewer inliers than asked for
-  bool searched_wide = false;   // the prediction did not guide the matching
+  bool searched_wide = false;   // tracking failed, descriptors were matched instead
 };
 
-/// What is known when the sequence has ended.
-struct OdometryResult {
-  ViewGraph graph;
-  RotationMap cam_from_world;  // one entry per frame
-  std::vector<EdgeMatches> edge_matches;
-  std::map<FrameId, Features> features;  // descriptors left out
+/// Where the time goes, seconds since the start.
+struct OdometrySeconds {
+  double pyramid = 0.0;
+  double tracking = 0.0;  // recovery included
+  double detection = 0.0;
+  double edges = 0.0;  // relative rotations
+  double averaging = 0.0;
+  double covariance = 0.0;
 };
 
-/// Orientations from 2-D matches alone, frame by frame: features, edges to the frames before,
-/// windowed averaging. Owns all that survives a frame. Source:  Chng et al., Monocular Rotational
-/// Odometry with Incremental Rotation Averaging and Loop Closure.
+/// What one frame brought.
+struct FrameEstimate {
+  FrameId frame;
+  double timestamp_s = 0.0;
+  Rotation cam_from_world;
+  // Of the error delta in Exp(delta) * cam_from_world against the first frame, rad^2; nullopt
+  // where nothing is known.
+  std::optional<Eigen::Matrix3d> covariance;
+  // Every orientation that this frame has moved, its own included; older ones are settled.
+  RotationMap window;
+  // The oldest of them, and its covariance.
+  FrameId settled;
+  std::optional<Eigen::Matrix3d> settled_covariance;
+  std::vector<Connection> connections;  // the frame's edges, to the newest view first
+  // Edges and features of the frame before, measured again now that its rotation rate is known
+  // better; for a rolling shutter only.
+  std::vector<RelativeRotation> revised_edges;
+  std::optional<Features> revised_features;
+  // Descriptors left out; for a rolling shutter, the keypoints that a global one would have seen.
+  Features features;
+  FrameReport report;
+};
+
+/// Orientations from 2-D matches alone, frame by frame: points tracked from image to image, edges
+/// to the frames before and to older keyframes, windowed averaging. Owns all that survives a
+/// frame, which is bounded: the newest views, some keyframes, and the window's edges.
+/// Source:  Chng et al., Monocular Rotational Odometry with Incremental Rotation Averaging and
+/// Loop Closure; ours tracks points instead of matching each pair of frames anew.
 class RotationalOdometry {
  public:
   /// Throws std::invalid_argument when an option or the camera is out of range.
@@ -63,27 +94,85 @@ class RotationalOdometry {
 
   /// Takes the next frame; frame ids and timestamps must ascend. An empty image gets the predicted
   /// orientation and no edge.
-  FrameReport AddFrame(FrameId frame, double timestamp_s, const cv::Mat& image);
+  /// @param image  8-bit, one or three channels (BGR), of the camera's size.
+  FrameEstimate AddFrame(FrameId frame, double timestamp_s, const cv::Mat& image);
 
-  /// The state so far; valid until the next frame.
-  const OdometryResult& result() const { return result_; }
-  /// The same, moved out of an odometry that is no longer needed.
-  OdometryResult TakeResult() && { return std::move(result_); }
+  const OdometrySeconds& seconds() const { return seconds_; }
+
+  /// Covariance of a frame that is still in the window, as in FrameEstimate.
+  std::optional<Eigen::Matrix3d> CovarianceOf(FrameId frame) const;
+
+  /// Covariance of the turn from frame i to frame j, both still in the window: of the error delta
+  /// in Exp(delta) * camj_from_cami, rad^2. The errors that the two share are not in it.
+  std::optional<Eigen::Matrix3d> CovarianceBetween(FrameId i, FrameId j) const;
 
  private:
+  ImagePyramid BuildPyramidOf(const cv::Mat& image);
   Rotation PredictOrientation(double timestamp_s) const;
-  void KeepGoodConnections(std::vector<Connection>& connections, FrameReport& report) const;
-  void StartFromBestEdge(FrameId frame, const std::vector<Connection>& connections);
-  void AverageWindow();
+  // Mean rotation rate since the frame before, in camera axes, rad/s. Drawing it out to the frame
+  // itself by the last change measured worse: accelerations of hand-held cameras do not last.
+  Eigen::Vector3d RotationRate(double timestamp_s, const Rotation& cam_from_world) const;
+  std::vector<OrientedView> RecentViews() const;
+  TrackingResult Track(const std::vector<OrientedView>& views,
+                       const TrackingTarget& target,
+                       FrameEstimate& estimate);
+  // The most points of one view that agree on a relative rotation, and that; none where fewer do
+  // than chance could make.
+  struct Agreement {
+    int num_points = 0;
+    Rotation cam_from_world;
+  };
+  Agreement AgreementOf(const TrackingResult& tracked,
+                        const std::vector<OrientedView>& views) const;
+  void CarryOn(const TrackingResult& tracked,
+               const std::vector<OrientedView>& views,
+               const Eigen::Vector3d& rate,
+               Features& features) const;
+  void DetectNewFeatures(const cv::Mat& image, const Eigen::Vector3d& rate, View& view);
+  void ReviseNewestView(double timestamp_s,
+                        const Rotation& next_from_world,
+                        FrameEstimate& estimate);
+  void Connect(const View& view, FrameEstimate& estimate);
+  std::vector<const Features*> Partners(const View& view) const;
+  std::vector<Connection> MeasureEdges(const Features& view,
+                                       const std::vector<const Features*>& partners) const;
+  void KeepGoodConnections(FrameEstimate& estimate) const;
+  void AverageWindow(FrameEstimate& estimate);
+  void UpdateCovariance(FrameEstimate& estimate);
+  // Drops what no later frame can refer to.
+  void Forget();
+  void UpdateFlow(const TrackingResult& tracked,
+                  const std::vector<OrientedView>& views,
+                  View& view) const;
+  void Remember(std::shared_ptr<View> view);
 
   Camera camera_;
   OdometryOptions options_;
   std::uint64_t seed_;
   int num_threads_;
 
-  std::deque<View> recent_;  // newest last
+  std::deque<std::shared_ptr<View>> recent_;     // newest first
+  std::deque<std::shared_ptr<View>> keyframes_;  // newest first
+  ViewGraph graph_;
+  RotationMap cam_from_world_;
   std::map<FrameId, double> timestamps_s_;
-  OdometryResult result_;
+  OrientationCovariance covariance_;
+  OdometrySeconds seconds_;
+  int next_track_ = 0;
+};
+
+/// What is known of a sequence: the frames' estimates put together.
+struct OdometryResult {
+  ViewGraph graph;
+  RotationMap cam_from_world;  // one entry per frame
+  std::vector<EdgeMatches> edge_matches;
+  std::map<FrameId, Features> features;
+  // As in FrameEstimate; frames whose uncertainty is not known are missing.
+  std::map<FrameId, Eigen::Matrix3d> covariance;
+
+  /// Adds the next frame's estimate. Tracks need features and matches; without them what is kept
+  /// is small.
+  void Add(FrameEstimate estimate, bool keep_features);
 };
 
 }  // namespace rotslam

@@ -17,6 +17,7 @@ packages=(
   # tests; GLPK and OpenGV to compare with, numpy for the independent check of `rotslam eval`
   libglpk-dev libgmock-dev libgtest-dev libopengv-dev python3-numpy
 )
+# Not needed: libbenchmark-dev, for the benchmarks (ROTSLAM_BUILD_BENCHMARKS).
 if [[ ${1:-} == --ci ]]; then
   packages+=(clang-format-14 clang-tidy-14)
 elif [[ $# -gt 0 ]]; then

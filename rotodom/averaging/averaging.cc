@@ -1,154 +1,201 @@
 #include "rotodom/averaging/averaging.h"
 
 #include <algorithm>
-#include <cmath>
+#include <array>
+#include <iterator>
 #include <stdexcept>
 #include <vector>
 
-#include <Eigen/Dense>
-#include <Eigen/SparseCholesky>
-
+#include "rotodom/averaging/edge_system.h"
 #include "rotodom/types/options.h"
 
 namespace rotslam {
 namespace {
 
-// One edge with a free end, as the normal equations want it.
-struct Term {
-  const RelativeRotation* edge;
-  int free_i;  // block of view i among the unknowns, -1 when held
-  int free_j;
-  Eigen::Matrix3d information;
+struct NamedMode {
+  const char* name;
+  AveragingMode mode;
 };
+constexpr std::array<NamedMode, 3> kModes = {{{"off", AveragingMode::kOff},
+                                              {"window", AveragingMode::kWindow},
+                                              {"global", AveragingMode::kGlobal}}};
 
-class WindowProblem {
- public:
-  WindowProblem(const ViewGraph& graph,
-                const RotationMap& cam_from_world,
-                const std::set<FrameId>& free_views,
-                const AveragingOptions& options)
-      : options_(options) {
-    for (const FrameId view : free_views) {
-      if (!cam_from_world.contains(view))
-        throw std::invalid_argument("AverageRotations: a free view has no start");
-    }
-    std::vector<int> edge_indices;
-    bool anchored = false;
-    for (const FrameId view : free_views) {
-      for (const int index : graph.EdgesOf(view)) {
-        const RelativeRotation& edge = graph.edges()[index];
-        if (!cam_from_world.contains(edge.i) || !cam_from_world.contains(edge.j)) continue;
-        edge_indices.push_back(index);
-        anchored |= !free_views.contains(edge.i) || !free_views.contains(edge.j);
-      }
-    }
-    std::sort(edge_indices.begin(), edge_indices.end());
-    edge_indices.erase(std::unique(edge_indices.begin(), edge_indices.end()), edge_indices.end());
+// The L1 stage is a start: it need not be finished.
+constexpr double kL1Step = 1e-3;
 
-    std::map<FrameId, int> block;
-    for (const FrameId view : free_views) {
-      if (!anchored && view == *free_views.begin()) continue;
-      block.emplace(view, static_cast<int>(views_.size()));
-      views_.push_back(view);
-    }
-    const double floor_rad = options.edge_floor_deg * kRadFromDeg;
-    for (const int index : edge_indices) {
+// Position in an ascending list, -1 when it is not there.
+int PositionIn(const std::vector<FrameId>& views, FrameId view) {
+  const auto found = std::lower_bound(views.begin(), views.end(), view);
+  return found == views.end() || *found != view ? -1 : static_cast<int>(found - views.begin());
+}
+
+Eigen::Matrix3d WithFloor(const Eigen::Matrix3d& covariance, const AveragingOptions& options) {
+  const double floor_rad = options.edge_floor_deg * kRadFromDeg;
+  return covariance + floor_rad * floor_rad * Eigen::Matrix3d::Identity();
+}
+
+// Edges with a free end, each once: of an edge with two free ends the later end brings it.
+std::vector<const RelativeRotation*> EdgesAt(const ViewGraph& graph,
+                                             const std::vector<FrameId>& free) {
+  std::vector<const RelativeRotation*> edges;
+  edges.reserve(6 * free.size());
+  for (const FrameId view : free) {
+    for (const int index : graph.EdgesOf(view)) {
       const RelativeRotation& edge = graph.edges()[index];
-      const auto i = block.find(edge.i);
-      const auto j = block.find(edge.j);
-      const Eigen::Matrix3d covariance =
-          edge.covariance + floor_rad * floor_rad * Eigen::Matrix3d::Identity();
-      terms_.push_back({&edge,
-                        i == block.end() ? -1 : i->second,
-                        j == block.end() ? -1 : j->second,
-                        covariance.inverse()});
+      if (view == edge.j || PositionIn(free, edge.j) < 0) edges.push_back(&edge);
     }
   }
+  return edges;
+}
 
-  const std::vector<FrameId>& views() const { return views_; }
-  bool IsEmpty() const { return views_.empty() || terms_.empty(); }
-
-  // One re-weighted Gauss-Newton step: a rotation vector for every free view, applied on the left.
-  Eigen::VectorXd Step(const RotationMap& cam_from_world) const {
-    const int size = 3 * static_cast<int>(views_.size());
-    std::vector<Eigen::Triplet<double>> triplets;
-    Eigen::VectorXd gradient = Eigen::VectorXd::Zero(size);
-    const auto add_block = [&](int row, int column, const Eigen::Matrix3d& block) {
-      for (int r = 0; r < 3; ++r) {
-        for (int c = 0; c < 3; ++c) triplets.emplace_back(3 * row + r, 3 * column + c, block(r, c));
-      }
-    };
-    for (const Term& term : terms_) {
-      const Rotation& j_from_world = cam_from_world.at(term.edge->j);
-      const Rotation& i_from_world = cam_from_world.at(term.edge->i);
-      const Rotation predicted = j_from_world * i_from_world.Inverse();
-      // Exp(residual) * measured = predicted: the edge's error in the frame of camera j.
-      const Eigen::Vector3d residual = (predicted * term.edge->j_from_i.Inverse()).Log();
-      const double squared = residual.dot(term.information * residual);
-      const double ratio = 1.0 + squared / (options_.loss_sigmas * options_.loss_sigmas);
-      const Eigen::Matrix3d W = term.information / (ratio * ratio);
-      // Exp(a) R_j R_i^T Exp(-b) = Exp(a - R_ji b) R_ji to first order.
-      const Eigen::Matrix3d J_i = -predicted.Matrix();
-      if (term.free_j >= 0) {
-        add_block(term.free_j, term.free_j, W);
-        gradient.segment<3>(3 * term.free_j) += W * residual;
-      }
-      if (term.free_i >= 0) {
-        add_block(term.free_i, term.free_i, J_i.transpose() * W * J_i);
-        gradient.segment<3>(3 * term.free_i) += J_i.transpose() * W * residual;
-      }
-      if (term.free_i >= 0 && term.free_j >= 0) {
-        add_block(term.free_j, term.free_i, W * J_i);
-        add_block(term.free_i, term.free_j, J_i.transpose() * W);
-      }
-    }
-    // A view without edges, or whose edges have all lost their weight, stays where it is.
-    for (int k = 0; k < size; ++k) triplets.emplace_back(k, k, 1e-6);
-    Eigen::SparseMatrix<double> H(size, size);
-    H.setFromTriplets(triplets.begin(), triplets.end());
-    const Eigen::SimplicialLDLT<Eigen::SparseMatrix<double>> ldlt(H);
-    return -ldlt.solve(gradient);
+// The ends of `edges` that are not free, less those without an orientation.
+std::vector<FrameId> HeldAt(const std::vector<const RelativeRotation*>& edges,
+                            const std::vector<FrameId>& free,
+                            const RotationMap& cam_from_world) {
+  std::vector<FrameId> held;
+  for (const RelativeRotation* edge : edges) {
+    if (PositionIn(free, edge->i) < 0) held.push_back(edge->i);
+    if (PositionIn(free, edge->j) < 0) held.push_back(edge->j);
   }
+  std::sort(held.begin(), held.end());
+  held.erase(std::unique(held.begin(), held.end()), held.end());
+  std::erase_if(held, [&](FrameId view) { return !cam_from_world.contains(view); });
+  return held;
+}
 
- private:
-  const AveragingOptions& options_;
-  std::vector<FrameId> views_;
-  std::vector<Term> terms_;
-};
+// The robust least-squares problem; the free views come first in its list.
+EdgeSystem MakeSystem(const std::vector<const RelativeRotation*>& edges,
+                      const std::vector<FrameId>& free,
+                      const std::vector<FrameId>& held,
+                      const RotationMap& cam_from_world,
+                      const AveragingOptions& options) {
+  std::vector<Eigen::Quaterniond> orientations;
+  orientations.reserve(free.size() + held.size());
+  for (const FrameId view : free) orientations.push_back(cam_from_world.at(view).Quaternion());
+  for (const FrameId view : held) orientations.push_back(cam_from_world.at(view).Quaternion());
+  const int num_free = static_cast<int>(free.size());
+  EdgeSystem system(std::move(orientations), num_free, options.loss_sigmas);
+  const auto position = [&](FrameId view) {
+    if (const int among_free = PositionIn(free, view); among_free >= 0) return among_free;
+    const int among_held = PositionIn(held, view);
+    return among_held < 0 ? -1 : num_free + among_held;
+  };
+  system.Reserve(edges.size());
+  for (const RelativeRotation* edge : edges) {
+    const int i = position(edge->i);
+    const int j = position(edge->j);
+    if (i < 0 || j < 0 || std::min(i, j) >= num_free) continue;
+    system.AddEdge(i, j, edge->j_from_i, WithFloor(edge->covariance, options));
+  }
+  return system;
+}
 
 }  // namespace
 
+std::optional<AveragingMode> AveragingModeNamed(const std::string& name) {
+  for (const NamedMode& named : kModes) {
+    if (name == named.name) return named.mode;
+  }
+  return std::nullopt;
+}
+
 std::optional<std::string> AveragingOptions::Problem() const {
+  if (!AveragingModeNamed(mode)) return OutOfRange("mode", mode, "off, window or global");
   if (window < 1) return OutOfRange("window", window, "at least 1");
   if (!(edge_floor_deg > 0.0)) return OutOfRange("edge_floor_deg", edge_floor_deg, "positive");
+  if (!(edge_error_factor > 0.0)) {
+    return OutOfRange("edge_error_factor", edge_error_factor, "positive");
+  }
+  if (!(lasting_share >= 0.0 && lasting_share <= 1.0)) {
+    return OutOfRange("lasting_share", lasting_share, "from 0 to 1");
+  }
+  if (!(lasting_views > 0.0)) return OutOfRange("lasting_views", lasting_views, "positive");
+  if (!(shared_noise >= 0.0 && shared_noise <= 1.0)) {
+    return OutOfRange("shared_noise", shared_noise, "0 to 1");
+  }
   if (!(loss_sigmas > 0.0)) return OutOfRange("loss_sigmas", loss_sigmas, "positive");
+  if (l1_iterations < 0) return OutOfRange("l1_iterations", l1_iterations, "zero or more");
   if (!(min_step_deg > 0.0)) return OutOfRange("min_step_deg", min_step_deg, "positive");
   if (max_iterations < 1) return OutOfRange("max_iterations", max_iterations, "at least 1");
   return std::nullopt;
 }
 
+std::set<FrameId> ViewsToAverage(const RotationMap& cam_from_world,
+                                 const AveragingOptions& options) {
+  if (const auto problem = options.Problem()) {
+    throw std::invalid_argument("AveragingOptions: " + *problem);
+  }
+  const AveragingMode mode = *AveragingModeNamed(options.mode);
+  std::set<FrameId> views;
+  if (mode == AveragingMode::kOff || cam_from_world.empty()) return views;
+  const auto first = cam_from_world.begin();
+  for (auto entry = std::prev(cam_from_world.end()); entry != first; --entry) {
+    if (mode == AveragingMode::kWindow && static_cast<int>(views.size()) == options.window) break;
+    views.insert(views.begin(), entry->first);
+  }
+  return views;
+}
+
 RotationMap AverageRotations(const ViewGraph& graph,
-                             RotationMap cam_from_world,
+                             const RotationMap& cam_from_world,
                              const std::set<FrameId>& free_views,
                              const AveragingOptions& options) {
   if (const auto problem = options.Problem()) {
     throw std::invalid_argument("AveragingOptions: " + *problem);
   }
-  const WindowProblem problem(graph, cam_from_world, free_views, options);
-  if (problem.IsEmpty()) return cam_from_world;
-  for (int iteration = 0; iteration < options.max_iterations; ++iteration) {
-    const Eigen::VectorXd step = problem.Step(cam_from_world);
-    if (!step.allFinite()) break;
-    double largest = 0.0;
-    for (int k = 0; k < static_cast<int>(problem.views().size()); ++k) {
-      const Eigen::Vector3d delta = step.segment<3>(3 * k);
-      Rotation& rotation = cam_from_world.at(problem.views()[k]);
-      rotation = Rotation::Exp(delta) * rotation;
-      largest = std::max(largest, delta.norm());
+  RotationMap averaged;
+  for (const FrameId view : free_views) {
+    const auto start = cam_from_world.find(view);
+    if (start == cam_from_world.end()) {
+      throw std::invalid_argument("AverageRotations: a free view has no start");
     }
-    if (largest < options.min_step_deg * kRadFromDeg) break;
+    averaged.emplace_hint(averaged.end(), *start);
   }
-  return cam_from_world;
+  std::vector<FrameId> free(free_views.begin(), free_views.end());
+  const std::vector<const RelativeRotation*> edges = EdgesAt(graph, free);
+  std::vector<FrameId> held = HeldAt(edges, free, cam_from_world);
+  if (held.empty() && !free.empty()) {
+    held.push_back(free.front());
+    free.erase(free.begin());
+  }
+  EdgeSystem system = MakeSystem(edges, free, held, cam_from_world, options);
+  if (system.terms().empty()) return averaged;
+  system.Linearize();
+  if (system.HasDoubtfulView()) {
+    for (int iteration = 0; iteration < options.l1_iterations; ++iteration) {
+      if (system.Step(EdgeLoss::kL1) < kL1Step) break;
+    }
+  }
+  for (int iteration = 0; iteration < options.max_iterations; ++iteration) {
+    const double turn = system.Step();
+    if (turn < options.min_step_deg * kRadFromDeg) break;
+  }
+  for (int k = 0; k < static_cast<int>(free.size()); ++k) {
+    averaged.at(free[k]) = system.CamFromWorld(k);
+  }
+  return averaged;
+}
+
+std::map<FrameId, int> CountInlierEdges(const ViewGraph& graph,
+                                        const RotationMap& cam_from_world,
+                                        const AveragingOptions& options) {
+  if (const auto problem = options.Problem()) {
+    throw std::invalid_argument("AveragingOptions: " + *problem);
+  }
+  std::map<FrameId, int> counts;
+  for (const auto& [view, rotation] : cam_from_world) counts.emplace_hint(counts.end(), view, 0);
+  for (const RelativeRotation& edge : graph.edges()) {
+    const auto i = cam_from_world.find(edge.i);
+    const auto j = cam_from_world.find(edge.j);
+    if (i == cam_from_world.end() || j == cam_from_world.end()) continue;
+    const Rotation predicted = j->second * i->second.Inverse();
+    const Eigen::Vector3d residual = (predicted * edge.j_from_i.Inverse()).Log();
+    const Eigen::Matrix3d information = WithFloor(edge.covariance, options).inverse();
+    if (residual.dot(information * residual) > options.loss_sigmas * options.loss_sigmas) continue;
+    ++counts.at(edge.i);
+    ++counts.at(edge.j);
+  }
+  return counts;
 }
 
 }  // namespace rotslam

@@ -266,6 +266,10 @@ std::optional<Eigen::Vector3d> Camera::Unproject(const Eigen::Vector2d& pixel) c
   return plane->homogeneous().normalized();
 }
 
+double Camera::RowTime(double y_px) const {
+  return height > 0 ? readout_s * ((y_px + 0.5) / height - 0.5) : 0.0;
+}
+
 std::optional<std::string> Camera::Problem() const {
   const auto positive = [](const char* name, double value) -> std::optional<std::string> {
     if (std::isfinite(value) && value > 0.0) return std::nullopt;
@@ -281,6 +285,11 @@ std::optional<std::string> Camera::Problem() const {
     if (!std::isfinite(distortion[k])) {
       return "distortion[" + std::to_string(k) + "] is not a finite number";
     }
+  }
+  if (!(readout_s >= 0.0 && readout_s < 1.0)) {
+    std::ostringstream text;
+    text << "readout_s is " << readout_s << ", must be 0 or more and below 1 second";
+    return text.str();
   }
   if (width < 0 || height < 0 || (width == 0) != (height == 0)) {
     return "size is " + std::to_string(width) + "x" + std::to_string(height) +
@@ -314,6 +323,7 @@ std::string Describe(const Camera& camera) {
   } else {
     text << ", size from the images";
   }
+  if (camera.readout_s > 0.0) text << ", rolling shutter " << camera.readout_s << " s";
   return text.str();
 }
 

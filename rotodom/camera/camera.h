@@ -27,6 +27,9 @@ struct Camera {
   double cx = 0.0;
   double cy = 0.0;
   std::array<double, 5> distortion = {};  // k1 k2 p1 p2 k3, or k1 k2 k3 k4 and a zero
+  // Rolling shutter: time from the exposure of the first row to that of the last; 0 for a global
+  // shutter.
+  double readout_s = 0.0;
 
   /// Pixel that shows `point_in_cam`; nullopt where the model does not reach (behind the image
   /// plane for kPinhole and kRadtan, beyond the fold of the distortion polynomial).
@@ -38,6 +41,9 @@ struct Camera {
   /// outside the image.
   /// Error: Project(Unproject(p)) == p to 1e-9 px where the model is invertible.
   std::optional<Eigen::Vector3d> Unproject(const Eigen::Vector2d& pixel) const;
+
+  /// When a row is exposed, counted from the middle of the frame; seconds, 0 for a global shutter.
+  double RowTime(double y_px) const;
 
   /// Pixels per radian near the image centre: the mean of fx and fy.
   double MeanFocal() const { return 0.5 * (fx + fy); }

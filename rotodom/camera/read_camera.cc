@@ -140,14 +140,14 @@ CameraModel WithoutEmptyDistortion(const Camera& camera) {
 
 Camera ReadOurs(const fs::path& file, const YAML::Node& root) {
   static const std::vector<std::string> kKeys = {
-      "model", "width", "height", "fx", "fy", "cx", "cy", "distortion"};
+      "model", "width", "height", "fx", "fy", "cx", "cy", "distortion", "readout_s"};
   for (const auto& entry : root) {
     const std::string key = entry.first.Scalar();
     if (std::find(kKeys.begin(), kKeys.end(), key) == kKeys.end()) {
       Fail(file,
            key +
                " is no key of a camera file; known are model, width, height, fx, fy, cx, cy, "
-               "distortion");
+               "distortion, readout_s");
     }
   }
   const Section section(file, root, "");
@@ -172,6 +172,7 @@ Camera ReadOurs(const fs::path& file, const YAML::Node& root) {
     Fail(file, "distortion is missing");
   }
   camera.distortion = ReadDistortion(section, "distortion", camera.model);
+  camera.readout_s = section.FiniteOrZero("readout_s");
   return camera;
 }
 
@@ -471,7 +472,9 @@ std::string CameraYaml(const Camera& camera) {
     if (k > 0) text += ", ";
     text += NumberText(camera.distortion[k]);
   }
-  return text + "]\n";
+  text += "]\n";
+  if (camera.readout_s > 0.0) text += "readout_s: " + NumberText(camera.readout_s) + "\n";
+  return text;
 }
 
 void WriteCameraYaml(const fs::path& file, const Camera& camera) {

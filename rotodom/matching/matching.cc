@@ -9,8 +9,6 @@
 #include <numbers>
 #include <stdexcept>
 
-#include <opencv2/video/tracking.hpp>
-
 #include "rotodom/types/options.h"
 
 namespace rotslam {
@@ -168,19 +166,7 @@ std::optional<std::string> MatchingOptions::Problem() const {
     return OutOfRange("max_distance", max_distance, "0 to 256");
   if (!(ratio > 0.0 && ratio <= 1.0)) return OutOfRange("ratio", ratio, "above 0 and at most 1");
   if (max_level_step < 0) return OutOfRange("max_level_step", max_level_step, "zero or more");
-  if (patch_px < 5 || patch_px % 2 == 0)
-    return OutOfRange("patch_px", patch_px, "odd and at least 5");
-  if (patch_levels < 1) return OutOfRange("patch_levels", patch_levels, "at least 1");
-  if (!(max_correction_px > 0.0))
-    return OutOfRange("max_correction_px", max_correction_px, "positive");
   return std::nullopt;
-}
-
-std::vector<cv::Mat> BuildPatchPyramid(const cv::Mat& grey, const MatchingOptions& options) {
-  std::vector<cv::Mat> pyramid;
-  cv::buildOpticalFlowPyramid(
-      grey, pyramid, cv::Size(options.patch_px, options.patch_px), options.patch_levels - 1);
-  return pyramid;
 }
 
 Matches MatchFeatures(const Features& features_i,
@@ -222,52 +208,9 @@ Matches MatchFeatures(const Features& features_i,
   }
   for (int i = 0; i < features_i.size(); ++i) {
     if (best[i].j < 0) continue;
-    result.matches.push_back(
-        {KeypointIndex{i}, KeypointIndex{best[i].j}, features_j.keypoints_px[best[i].j]});
+    result.matches.push_back({KeypointIndex{i}, KeypointIndex{best[i].j}});
   }
   return result;
-}
-
-Matches RefineMatches(Matches matches,
-                      const Features& features_i,
-                      const Features& features_j,
-                      const std::vector<cv::Mat>& pyramid_i,
-                      const std::vector<cv::Mat>& pyramid_j,
-                      const MatchingOptions& options,
-                      double scale_factor) {
-  if (matches.matches.empty()) return matches;
-  std::vector<cv::Point2f> points_i;
-  std::vector<cv::Point2f> points_j;
-  for (const Match& match : matches.matches) {
-    const Eigen::Vector2d& from = features_i.keypoints_px[match.i.value];
-    points_i.emplace_back(static_cast<float>(from.x()), static_cast<float>(from.y()));
-    points_j.emplace_back(static_cast<float>(match.keypoint_j_px.x()),
-                          static_cast<float>(match.keypoint_j_px.y()));
-  }
-  std::vector<std::uint8_t> found;
-  std::vector<float> unused_error;
-  cv::calcOpticalFlowPyrLK(
-      pyramid_i,
-      pyramid_j,
-      points_i,
-      points_j,
-      found,
-      unused_error,
-      cv::Size(options.patch_px, options.patch_px),
-      options.patch_levels - 1,
-      cv::TermCriteria(cv::TermCriteria::COUNT + cv::TermCriteria::EPS, 20, 0.01),
-      cv::OPTFLOW_USE_INITIAL_FLOW);
-  std::vector<Match> kept;
-  for (std::size_t k = 0; k < matches.matches.size(); ++k) {
-    if (!found[k]) continue;
-    Match match = matches.matches[k];
-    match.keypoint_j_px = Eigen::Vector2d(points_j[k].x, points_j[k].y);
-    const double scale = std::pow(scale_factor, features_j.levels[match.j.value]);
-    const double correction = (match.keypoint_j_px - features_j.keypoints_px[match.j.value]).norm();
-    if (correction <= options.max_correction_px * scale) kept.push_back(match);
-  }
-  matches.matches = std::move(kept);
-  return matches;
 }
 
 }  // namespace rotslam

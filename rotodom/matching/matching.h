@@ -26,11 +26,6 @@ struct MatchingOptions {
   double ratio = 0.85;
   // Pyramid levels that a feature may move between two frames.
   int max_level_step = 1;
-  // Patch side, pyramid levels and largest correction of the sub-pixel refinement; the correction
-  // is in pixels of the feature's own level.
-  int patch_px = 11;
-  int patch_levels = 2;
-  double max_correction_px = 3.0;
 
   std::optional<std::string> Problem() const;
 
@@ -42,18 +37,13 @@ struct MatchingOptions {
     visit("max_distance", max_distance);
     visit("ratio", ratio);
     visit("max_level_step", max_level_step);
-    visit("patch_px", patch_px);
-    visit("patch_levels", patch_levels);
-    visit("max_correction_px", max_correction_px);
   }
 };
 
-/// The same corner in two frames: positions in their `Features`, and where frame j shows the patch
-/// that frame i has at its keypoint, to a fraction of a pixel.
+/// The same corner in two frames.
 struct Match {
   KeypointIndex i;
   KeypointIndex j;
-  Eigen::Vector2d keypoint_j_px;
 };
 
 enum class SearchRange { kGuided, kWide, kWholeImage };
@@ -65,9 +55,6 @@ struct Matches {
   SearchRange range = SearchRange::kGuided;  // how far the search had to go
 };
 
-/// Image pyramid for RefineMatches, as cv::calcOpticalFlowPyrLK takes it.
-std::vector<cv::Mat> BuildPatchPyramid(const cv::Mat& grey, const MatchingOptions& options);
-
 /// Matches two frames' descriptors around the positions that the predicted rotation gives: the best
 /// candidate of each keypoint of frame i by ratio test; of several that chose the same keypoint of
 /// frame j, the nearest; of those, the ones whose patches turn as most do. Searches wider only
@@ -77,16 +64,5 @@ Matches MatchFeatures(const Features& features_i,
                       const Rotation& predicted_j_from_i,
                       const Camera& camera,
                       const MatchingOptions& options);
-
-/// Sharpens `matches` by aligning the patch around each keypoint of frame i with frame j
-/// (Lucas-Kanade), and drops those that cannot be aligned or move by more than
-/// options.max_correction_px.
-Matches RefineMatches(Matches matches,
-                      const Features& features_i,
-                      const Features& features_j,
-                      const std::vector<cv::Mat>& pyramid_i,
-                      const std::vector<cv::Mat>& pyramid_j,
-                      const MatchingOptions& options,
-                      double scale_factor);
 
 }  // namespace rotslam

@@ -46,15 +46,6 @@ void NormalEpipolarSums::Add(const BearingPair& pair, double weight) {
   S_.noalias() += weight * q * q.transpose();
 }
 
-Eigen::Matrix<double, 3, 2> TangentBasis(const Eigen::Vector3d& direction) {
-  int smallest = 0;
-  direction.cwiseAbs().minCoeff(&smallest);
-  Eigen::Matrix<double, 3, 2> basis;
-  basis.col(0) = direction.cross(Eigen::Vector3d::Unit(smallest)).normalized();
-  basis.col(1) = direction.cross(basis.col(0));
-  return basis;
-}
-
 NormalEpipolarMinimum MinimizeNormalEpipolar(const NormalEpipolarSums& sums,
                                              const Rotation& start_j_from_i,
                                              int max_iterations) {

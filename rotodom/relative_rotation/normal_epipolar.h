@@ -5,15 +5,10 @@
 
 #include <Eigen/Core>
 
+#include "rotodom/relative_rotation/bearing_pair.h"
 #include "rotodom/types/rotation.h"
 
 namespace rotslam {
-
-/// The same scene point seen from two cameras: unit bearings in camera i and camera j.
-struct BearingPair {
-  Eigen::Vector3d bearing_i;
-  Eigen::Vector3d bearing_j;
-};
 
 /// Sums over bearing pairs that hold all the normal epipolar constraint needs to know about them,
 /// so that the cost of a solver iteration does not depend on their number.
@@ -47,9 +42,6 @@ struct NormalEpipolarMinimum {
 NormalEpipolarMinimum MinimizeNormalEpipolar(const NormalEpipolarSums& sums,
                                              const Rotation& start_j_from_i,
                                              int max_iterations);
-
-/// Two unit vectors that span the plane perpendicular to `direction`, as columns.
-Eigen::Matrix<double, 3, 2> TangentBasis(const Eigen::Vector3d& direction);
 
 /// Rotation that best aligns the pairs' bearings, R f_i ~ f_j (least squares).
 /// @return  nullopt for fewer than two pairs or bearings that are all parallel.

@@ -95,8 +95,13 @@ std::string DamageOfPng(const std::vector<unsigned char>& bytes) {
 }
 
 cv::Mat DecodeImage(const fs::path& file, std::string& problem) {
-  std::ifstream stream(file, std::ios::binary);
-  const std::vector<unsigned char> bytes{std::istreambuf_iterator<char>(stream), {}};
+  std::ifstream stream(file, std::ios::binary | std::ios::ate);
+  std::vector<unsigned char> bytes;
+  if (const std::streamoff size = stream.tellg(); size > 0) {
+    bytes.resize(static_cast<std::size_t>(size));
+    stream.seekg(0);
+    stream.read(reinterpret_cast<char*>(bytes.data()), size);
+  }
   if (!stream.is_open() || stream.bad()) {
     problem = "file cannot be opened";
     return {};

@@ -23,6 +23,7 @@ struct RelativeRotation {
   Eigen::Vector3d translation_direction = Eigen::Vector3d::Zero();
   int num_inliers = 0;
   bool rotation_only = false;  // the matches give no evidence of a baseline
+  double noise_px = 0.1;  // standard deviation of the inliers' distance from their epipolar lines
   double parallax_px = 0.0;  // root mean square of the inliers' flow that rotation does not explain
 };
 

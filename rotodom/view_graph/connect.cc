@@ -1,42 +1,50 @@
 #include "rotodom/view_graph/connect.h"
 
+#include <array>
+
 #include "rotodom/types/options.h"
 #include "rotodom/types/parallel.h"
 
 namespace rotslam {
 namespace {
 
-std::optional<Connection> Connect(const View& view_i,
-                                  const View& view_j,
-                                  const Rotation& predicted_j_from_i,
-                                  const Camera& camera,
-                                  const ConnectOptions& options) {
-  const Matches matches = RefineMatches(
-      MatchFeatures(view_i.features, view_j.features, predicted_j_from_i, camera, options.matching),
-      view_i.features,
-      view_j.features,
-      view_i.pyramid,
-      view_j.pyramid,
-      options.matching,
-      options.features.scale_factor);
-  std::vector<BearingPair> pairs;
-  std::vector<int> match_of_pair;
-  for (int k = 0; k < static_cast<int>(matches.matches.size()); ++k) {
-    const auto bearing_j = camera.Unproject(matches.matches[k].keypoint_j_px);
-    if (!bearing_j) continue;
-    pairs.push_back({view_i.features.bearings[matches.matches[k].i.value], *bearing_j});
-    match_of_pair.push_back(k);
+struct CommonPoints {
+  std::vector<BearingPair> bearings;
+  std::vector<std::array<int, 2>> keypoints;
+};
+
+CommonPoints FindCommonPoints(const Features& view_i, const Features& view_j) {
+  CommonPoints common;
+  int i = 0;
+  int j = 0;
+  while (i < view_i.size() && j < view_j.size()) {
+    const TrackId track_i = view_i.tracks[i];
+    const TrackId track_j = view_j.tracks[j];
+    if (track_i == track_j) {
+      common.bearings.push_back({view_i.bearings[i], view_j.bearings[j]});
+      common.keypoints.push_back({i, j});
+    }
+    i += track_i <= track_j;
+    j += track_j <= track_i;
   }
-  const FrameId i = view_i.features.frame;
-  const FrameId j = view_j.features.frame;
+  return common;
+}
+
+std::optional<Connection> Connect(const Features& view_i,
+                                  const Features& view_j,
+                                  const Rotation& predicted_j_from_i,
+                                  double focal_px,
+                                  const ConnectOptions& options) {
+  const CommonPoints common = FindCommonPoints(view_i, view_j);
+  const FrameId i = view_i.frame;
+  const FrameId j = view_j.frame;
   const std::uint64_t seed = options.seed * 0x9E3779B97F4A7C15ULL +
                              (std::uint64_t(i.value) << 32 | std::uint32_t(j.value));
   const auto estimate = EstimateRelativeRotation(
-      pairs, predicted_j_from_i, camera.MeanFocal(), options.relative_rotation, seed);
+      common.bearings, predicted_j_from_i, focal_px, options.relative_rotation, seed);
   if (!estimate) return std::nullopt;
 
   Connection connection;
-  connection.range = matches.range;
   connection.edge.i = connection.matches.frame_i = i;
   connection.edge.j = connection.matches.frame_j = j;
   connection.edge.j_from_i = estimate->j_from_i;
@@ -44,11 +52,16 @@ std::optional<Connection> Connect(const View& view_i,
   connection.edge.translation_direction = estimate->translation_direction;
   connection.edge.num_inliers = static_cast<int>(estimate->inliers.size());
   connection.edge.rotation_only = estimate->rotation_only;
+  connection.edge.noise_px = estimate->noise_px;
   connection.edge.parallax_px = estimate->parallax_px;
-  for (const int inlier : estimate->inliers) {
-    const Match& match = matches.matches[match_of_pair[inlier]];
-    connection.matches.pairs.push_back({match.i.value, match.j.value});
-    connection.keypoint_j_px.push_back(match.keypoint_j_px);
+  std::size_t next_inlier = 0;
+  for (int k = 0; k < static_cast<int>(common.keypoints.size()); ++k) {
+    if (next_inlier < estimate->inliers.size() && estimate->inliers[next_inlier] == k) {
+      connection.matches.pairs.push_back(common.keypoints[k]);
+      ++next_inlier;
+    } else {
+      connection.outliers_j.push_back(common.keypoints[k][1]);
+    }
   }
   return connection;
 }
@@ -60,20 +73,30 @@ std::optional<std::string> ViewGraphOptions::Problem() const {
   if (min_edge_inliers < 0) {
     return OutOfRange("min_edge_inliers", min_edge_inliers, "zero or more");
   }
+  if (!(min_inlier_ratio >= 0.0 && min_inlier_ratio < 1.0)) {
+    return OutOfRange("min_inlier_ratio", min_inlier_ratio, "0 or more and below 1");
+  }
+  if (max_keyframe_edges < 0) {
+    return OutOfRange("max_keyframe_edges", max_keyframe_edges, "zero or more");
+  }
+  if (!(keyframe_overlap > 0.0 && keyframe_overlap <= 1.0)) {
+    return OutOfRange("keyframe_overlap", keyframe_overlap, "above 0 and at most 1");
+  }
+  if (max_keyframes < 0) return OutOfRange("max_keyframes", max_keyframes, "zero or more");
   return std::nullopt;
 }
 
-std::vector<Connection> ConnectView(const View& view,
-                                    const std::vector<const View*>& others,
+std::vector<Connection> ConnectView(const Features& view,
+                                    const std::vector<const Features*>& others,
                                     const RotationMap& predicted_cam_from_world,
-                                    const Camera& camera,
+                                    double focal_px,
                                     const ConnectOptions& options) {
   std::vector<std::optional<Connection>> connections(others.size());
-  const Rotation& view_from_world = predicted_cam_from_world.at(view.features.frame);
+  const Rotation& view_from_world = predicted_cam_from_world.at(view.frame);
   ParallelFor(static_cast<int>(others.size()), options.num_threads, [&](int k) {
-    const Rotation& other_from_world = predicted_cam_from_world.at(others[k]->features.frame);
+    const Rotation& other_from_world = predicted_cam_from_world.at(others[k]->frame);
     connections[k] =
-        Connect(*others[k], view, view_from_world * other_from_world.Inverse(), camera, options);
+        Connect(*others[k], view, view_from_world * other_from_world.Inverse(), focal_px, options);
   });
   std::vector<Connection> found;
   for (std::optional<Connection>& connection : connections) {

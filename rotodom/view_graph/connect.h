@@ -5,11 +5,7 @@
 #include <string>
 #include <vector>
 
-#include <opencv2/core.hpp>
-
-#include "rotodom/camera/camera.h"
 #include "rotodom/features/features.h"
-#include "rotodom/matching/matching.h"
 #include "rotodom/relative_rotation/relative_rotation.h"
 #include "rotodom/tracks/tracks.h"
 #include "rotodom/types/maps.h"
@@ -24,6 +20,17 @@ struct ViewGraphOptions {
   // edge takes the best one it has with at least RelativeRotationOptions::min_inliers, and is
   // flagged.
   int min_edge_inliers = 100;
+  // An edge needs this share of the points that both views show. Points are looked for where they
+  // are expected, so chance alone makes up to a third of wrong ones agree; of right ones nine in
+  // ten do, at old keyframes two in three.
+  double min_inlier_ratio = 0.5;
+  // Edges to older keyframes, oldest first, as long as they share more than min_edge_inliers
+  // points with the frame. They hold the drift where the camera stays in one place.
+  int max_keyframe_edges = 3;
+  // A frame that shares less than this part of its points with the last keyframe becomes the next.
+  double keyframe_overlap = 0.7;
+  // Keyframes remembered.
+  int max_keyframes = 8;
 
   std::optional<std::string> Problem() const;
 
@@ -31,40 +38,35 @@ struct ViewGraphOptions {
   void Visit(Visitor&& visit) {
     visit("window_frames", window_frames);
     visit("min_edge_inliers", min_edge_inliers);
+    visit("min_inlier_ratio", min_inlier_ratio);
+    visit("max_keyframe_edges", max_keyframe_edges);
+    visit("keyframe_overlap", keyframe_overlap);
+    visit("max_keyframes", max_keyframes);
   }
-};
-
-/// What is kept of a frame while others are matched against it.
-struct View {
-  Features features;
-  std::vector<cv::Mat> pyramid;
 };
 
 /// A measured edge of the view-graph together with the matches it rests on.
 struct Connection {
   RelativeRotation edge;
-  EdgeMatches matches;
-  std::vector<Eigen::Vector2d> keypoint_j_px;  // one per match, sub-pixel position in frame j
-  SearchRange range = SearchRange::kGuided;
+  EdgeMatches matches;          // those that agree with the edge
+  std::vector<int> outliers_j;  // keypoints of frame j whose match does not
 };
 
 struct ConnectOptions {
-  FeatureOptions features;
-  MatchingOptions matching;
   RelativeRotationOptions relative_rotation;
   std::uint64_t seed = 1;
   int num_threads = 1;
 };
 
-/// Matches `view` against each of `others` and estimates the relative rotations.
+/// Estimates the relative rotations between `view` and each of `others` from the points that both
+/// show.
 /// @param predicted_cam_from_world  start orientations of all views concerned.
 /// @return  one connection per other view that agrees on at least relative_rotation.min_inliers
-/// matches, in
-///          the order of `others`; the thread count does not change it.
-std::vector<Connection> ConnectView(const View& view,
-                                    const std::vector<const View*>& others,
+///          points, in the order of `others`; the thread count does not change it.
+std::vector<Connection> ConnectView(const Features& view,
+                                    const std::vector<const Features*>& others,
                                     const RotationMap& predicted_cam_from_world,
-                                    const Camera& camera,
+                                    double focal_px,
                                     const ConnectOptions& options);
 
 }  // namespace rotslam

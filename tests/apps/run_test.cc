@@ -2,6 +2,7 @@
 // truth.
 
 #include <filesystem>
+#include <sstream>
 #include <string>
 #include <vector>
 
@@ -63,6 +64,7 @@ TEST_P(OnBothSequences, WritesItsFilesAndNoOthers) {
   EXPECT_THAT(FileNames(Out()),
               ElementsAre("cloud.ply",
                           "keyframes_tum.txt",
+                          "rotations.csv",
                           "rotations_tum.txt",
                           "segments.csv",
                           "summary.json",
@@ -176,14 +178,68 @@ TEST_P(OnBothSequences, SegmentsCoverAllFramesOnce) {
   EXPECT_EQ(next, static_cast<int>(kNumFrames));
 }
 
+// Lines and cells of rotations.csv, the names of the columns first.
+std::vector<std::vector<std::string>> ReadRotationsCsv(const fs::path& path) {
+  std::vector<std::vector<std::string>> rows;
+  for (const std::string& line : Lines(ReadWholeFile(path))) {
+    std::istringstream cells(line + ",");
+    rows.emplace_back();
+    for (std::string cell; std::getline(cells, cell, ',');) rows.back().push_back(cell);
+  }
+  return rows;
+}
+
+TEST_P(OnBothSequences, RotationsCsvTellsWhatIsKnownOfEveryFrame) {
+  const auto rows = ReadRotationsCsv(Out() / "rotations.csv");
+  const Trajectory rotations = ReadTrajectory(Out() / "rotations_tum.txt");
+  ASSERT_EQ(rows.size(), kNumFrames + 1);
+  for (std::size_t k = 0; k < kNumFrames; ++k) {
+    const std::vector<std::string>& row = rows[k + 1];
+    ASSERT_EQ(row.size(), rows[0].size());
+    EXPECT_EQ(std::stoul(row[0]), k);
+    EXPECT_NEAR(std::stod(row[1]), rotations[k].timestamp_s, 1e-6);
+    const Rotation rotation(Eigen::Quaterniond(
+        std::stod(row[5]), std::stod(row[2]), std::stod(row[3]), std::stod(row[4])));
+    EXPECT_LT((rotation * rotations[k].world_from_cam.Inverse()).Angle(), 1e-9);
+    for (int axis = 6; axis < 9; ++axis) {
+      const double sigma_deg = std::stod(row[axis]);
+      // The first frame is the world; the others drift by hundredths of a degree.
+      EXPECT_EQ(sigma_deg > 0.0, k > 0) << k;
+      EXPECT_LT(sigma_deg, 0.5) << k;
+    }
+    EXPECT_GE(std::stoi(row[9]), 2) << k;
+  }
+  EXPECT_GT(std::stod(rows.back()[7]), std::stod(rows[2][7]));
+}
+
+TEST_F(RunCommand, AveragingFlagOverridesTheConfiguration) {
+  const TemporaryFolder folder;
+  const fs::path config = folder.Write("off.yaml", "rotodom: {averaging: {mode: \"off\"}}\n");
+  const auto rotations = [&](const std::string& name, const std::vector<std::string>& more) {
+    const fs::path out = folder.path() / name;
+    std::vector<std::string> arguments = more;
+    arguments.insert(arguments.end(), {"--last=20", "--out=" + out.string()});
+    const CommandResult result = Rotslam({"rotations", Sequence("handheld").string()}, arguments);
+    EXPECT_EQ(result.exit_code, 0) << result.error;
+    return ReadWholeFile(out / "rotations_tum.txt");
+  };
+  const std::string window = rotations("default", {});
+  EXPECT_EQ(rotations("window", {"--config=" + config.string(), "--averaging=window"}), window);
+  const std::string off = rotations("off", {"--averaging=off"});
+  EXPECT_NE(off, window);
+  EXPECT_EQ(rotations("configured", {"--config=" + config.string()}), off);
+  EXPECT_NE(rotations("global", {"--averaging=global"}), window);
+  EXPECT_NE(Rotslam({"rotations", Sequence("handheld").string(), "--averaging=some"}).exit_code, 0);
+}
+
 TEST_P(OnBothSequences, RotationsStopsAfterTheSameOrientations) {
   const TemporaryFolder folder;
   const CommandResult result =
       Rotslam({"rotations", Sequence().string(), "--out=" + folder.path().string()});
   ASSERT_EQ(result.exit_code, 0) << result.error;
   EXPECT_THAT(FileNames(folder.path()),
-              ElementsAre("rotations_tum.txt", "summary.json", "view_graph.g2o"));
-  for (const char* name : {"rotations_tum.txt", "view_graph.g2o"}) {
+              ElementsAre("rotations.csv", "rotations_tum.txt", "summary.json", "view_graph.g2o"));
+  for (const char* name : {"rotations.csv", "rotations_tum.txt", "view_graph.g2o"}) {
     EXPECT_EQ(ReadWholeFile(folder.path() / name), ReadWholeFile(Out() / name)) << name;
   }
   EXPECT_EQ(ReadSummary(folder.path())["command"], "rotations");

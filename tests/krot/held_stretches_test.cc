@@ -136,6 +136,39 @@ TEST(FindHeldStretches, AStepWithoutEdgesIsNotHeld) {
   EXPECT_EQ(stretches[1].first, FrameId{15});
 }
 
+// A keyframe before the turn, followed all through it, shows the way to it and not the camera's
+// rest.
+TEST(FindHeldStretches, EdgesToOldKeyframesDoNotHideATurn) {
+  Path path = MakePath(WalkStopWalk(10, 15, 10));
+  const auto without = Find(path);
+  for (int k = 12; k < 34; ++k) {
+    path.graph.AddEdge({FrameId{2}, FrameId{k}, Rotation::Exp({0.0, 0.02 * (k - 2), 0.0})});
+  }
+  const auto with = Find(path);
+  ASSERT_EQ(without.size(), 1u);
+  ASSERT_EQ(with.size(), 1u);
+  EXPECT_EQ(with[0].first, without[0].first);
+  EXPECT_EQ(with[0].last, without[0].last);
+  HeldStretchOptions all;
+  all.max_edge_span = 100;
+  EXPECT_TRUE(Find(path, all).empty());
+}
+
+// Where frames are missing, only long edges lead across.
+TEST(FindHeldStretches, LongEdgesCountWhereThereAreNoOthers) {
+  const Path path = MakePath(WalkStopWalk(10, 30, 10), 12);
+  Path cut = path;
+  cut.graph = ViewGraph();
+  const auto is_dark = [](FrameId frame) { return frame.value >= 20 && frame.value < 26; };
+  for (const RelativeRotation& edge : path.graph.edges()) {
+    if (!is_dark(edge.i) && !is_dark(edge.j)) cut.graph.AddEdge(edge);
+  }
+  const auto stretches = Find(cut);
+  ASSERT_EQ(stretches.size(), 1u);
+  EXPECT_LE(stretches[0].first, FrameId{13});
+  EXPECT_GE(stretches[0].last, FrameId{37});
+}
+
 TEST(FindHeldStretches, FrameNumbersMayHaveGaps) {
   const auto dense = Find(MakePath(WalkStopWalk(10, 15, 10)));
   const auto sparse = Find(MakePath(WalkStopWalk(10, 15, 10), 4, 0.5, 100, 5));
@@ -165,6 +198,8 @@ TEST(HeldStretchOptions, NamesTheFirstFieldOutOfRange) {
   HeldStretchOptions options;
   options.min_frames = 1;
   EXPECT_EQ(options.Problem(), "min_frames is 1, must be at least 2");
+  options.max_edge_span = 0;
+  EXPECT_EQ(options.Problem(), "max_edge_span is 0, must be at least 1");
   options.min_rotation_only_ratio = 0.0;
   EXPECT_TRUE(options.Problem().value_or("none").starts_with("min_rotation_only_ratio is 0"));
   EXPECT_THROW(FindHeldStretches({}, {}, options), std::invalid_argument);

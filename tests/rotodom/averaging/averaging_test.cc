@@ -7,6 +7,8 @@
 
 #include <gtest/gtest.h>
 
+#include "tests/scenes/rotation_graph.h"
+
 namespace rotslam {
 namespace {
 
@@ -93,10 +95,22 @@ ViewGraph MapEdges(const ViewGraph& graph, const std::function<void(RelativeRota
   return mapped;
 }
 
+// Weights as for edges that know their own errors; the defaults are chosen on real ones.
+AveragingOptions StrictOptions() {
+  AveragingOptions options;
+  options.edge_floor_deg = 0.2;
+  options.loss_sigmas = 3.0;
+  return options;
+}
+
 RotationMap Average(const ViewGraph& graph,
                     const RotationMap& start,
                     const std::set<FrameId>& free_views) {
-  return AverageRotations(graph, start, free_views, {});
+  RotationMap averaged = start;
+  for (const auto& [view, rotation] : AverageRotations(graph, start, free_views, StrictOptions())) {
+    averaged[view] = rotation;
+  }
+  return averaged;
 }
 
 TEST(AverageRotations, CleanEdgesGiveTheTruthWhateverTheWeights) {
@@ -227,6 +241,132 @@ TEST(AverageRotations, LadderOfNoiseAndWrongEdges) {
   }
 }
 
+// Error of the turns from view to view, degrees, mean over graphs: incremental with the window, or
+// all views at once from the chain; every view starts from the edge to the one before.
+struct L1Case {
+  bool global = false;
+  double wrong_ratio = 0.0;
+  bool wrong_starts = false;
+};
+
+double StepErrorDeg(const L1Case& test, int l1_iterations) {
+  constexpr int kNumGraphs = 4;
+  AveragingOptions options = StrictOptions();
+  options.mode = test.global ? "global" : "window";
+  options.l1_iterations = l1_iterations;
+  double sum = 0.0;
+  for (std::uint64_t seed = 1; seed <= kNumGraphs; ++seed) {
+    const RotationGraph scene = MakeRotationGraph({.num_views = 150,
+                                                   .keyframe_every = 8,
+                                                   .wrong_ratio = test.wrong_ratio,
+                                                   .wrong_steps = test.wrong_starts,
+                                                   .seed = seed});
+    RotationMap rotations;
+    for (int k = 0; k < 150; ++k) {
+      const FrameId view{k};
+      const FrameId before{k - 1};
+      rotations[view] =
+          k == 0 ? Rotation() : scene.graph.FindEdge(before, view)->j_from_i * rotations.at(before);
+      if (test.global && k + 1 < 150) continue;
+      for (const auto& [moved, rotation] :
+           AverageRotations(scene.graph, rotations, ViewsToAverage(rotations, options), options)) {
+        rotations[moved] = rotation;
+      }
+    }
+    sum += CompareRotations(rotations, scene.true_cam_from_world).step_rms_deg;
+  }
+  return sum / kNumGraphs;
+}
+
+TEST(AverageRotations, L1ChangesNothingWhenTheStartsAreRight) {
+  for (const bool global : {false, true}) {
+    for (const double wrong_ratio : {0.0, 0.1, 0.2, 0.3}) {
+      const double without = StepErrorDeg({global, wrong_ratio, false}, 0);
+      const double with = StepErrorDeg({global, wrong_ratio, false}, 20);
+      EXPECT_NEAR(with, without, 0.002) << (global ? "global " : "window ") << wrong_ratio;
+      EXPECT_LT(without, 0.06) << (global ? "global " : "window ") << wrong_ratio;
+    }
+  }
+}
+
+TEST(AverageRotations, L1RecoversFromWrongStarts) {
+  for (const bool global : {false, true}) {
+    for (const double wrong_ratio : {0.1, 0.2, 0.3, 0.4}) {
+      SCOPED_TRACE(testing::Message() << (global ? "global " : "window ") << wrong_ratio);
+      const double without = StepErrorDeg({global, wrong_ratio, true}, 0);
+      const double with = StepErrorDeg({global, wrong_ratio, true}, 20);
+      EXPECT_GT(without, 3.0);
+      // At 40 % some views see more wrong edges than right ones.
+      EXPECT_LT(with, wrong_ratio < 0.35 ? 0.3 : 0.6);
+      RecordProperty(std::string(global ? "global" : "window") + std::to_string(wrong_ratio),
+                     std::to_string(without) + " without, " + std::to_string(with) + " with");
+    }
+  }
+}
+
+// Many free views take the sparse road, few the dense one: together or one window at a time, the
+// same minimum.
+TEST(AverageRotations, SparseEqualsDense) {
+  const RotationGraph scene = MakeRotationGraph({.num_views = 60, .noise_deg = 0.3});
+  AveragingOptions options;
+  options.min_step_deg = 1e-8;
+  options.max_iterations = 200;
+  options.mode = "global";
+  RotationMap rotations = scene.chained_cam_from_world;
+  const auto average = [&](const std::set<FrameId>& free_views) {
+    double moved = 0.0;
+    for (const auto& [view, rotation] :
+         AverageRotations(scene.graph, rotations, free_views, options)) {
+      moved = std::max(moved, (rotation * rotations.at(view).Inverse()).AngleDeg());
+      rotations[view] = rotation;
+    }
+    return moved;
+  };
+  EXPECT_GT(average(ViewsToAverage(rotations, options)), 0.05);
+  for (int first = 1; first < 60; first += 5) {
+    std::set<FrameId> window;
+    for (int k = first; k < std::min(60, first + 10); ++k) window.insert(FrameId{k});
+    EXPECT_LT(average(window), 1e-5) << first;
+  }
+}
+
+TEST(ViewsToAverage, FollowsTheMode) {
+  RotationMap rotations;
+  AveragingOptions options;
+  const auto count = [&](const char* mode) {
+    options.mode = mode;
+    return ViewsToAverage(rotations, options).size();
+  };
+  for (const char* mode : {"off", "window", "global"}) EXPECT_EQ(count(mode), 0u);
+  for (int k = 0; k < 30; ++k) rotations[FrameId{k}] = Rotation();
+  EXPECT_EQ(count("off"), 0u);
+  EXPECT_EQ(count("global"), 29u);
+  EXPECT_EQ(count("window"), 10u);
+  EXPECT_EQ(*ViewsToAverage(rotations, options).begin(), FrameId{20});
+  options.window = 40;
+  EXPECT_EQ(*ViewsToAverage(rotations, options).begin(), FrameId{1});
+  EXPECT_THROW(count("sometimes"), std::invalid_argument);
+}
+
+TEST(CountInlierEdges, CountsThoseThatAgree) {
+  const Scene scene = MakeScene({.noise_deg = 0.01});
+  ViewGraph graph = scene.graph;
+  RelativeRotation wrong = *graph.FindEdge(FrameId{3}, FrameId{5});
+  wrong.j_from_i = Rotation::Exp({0.1, 0.0, 0.0}) * wrong.j_from_i;
+  graph.AddEdge(wrong);
+  RotationMap rotations = scene.truth;
+  rotations.erase(FrameId{11});
+  rotations[FrameId{40}] = Rotation();
+  const std::map<FrameId, int> counts = CountInlierEdges(graph, rotations, StrictOptions());
+  EXPECT_EQ(counts.size(), 12u);
+  EXPECT_EQ(counts.at(FrameId{0}), 4);
+  EXPECT_EQ(counts.at(FrameId{3}), 6);
+  EXPECT_EQ(counts.at(FrameId{4}), 8);
+  EXPECT_EQ(counts.at(FrameId{5}), 7);
+  EXPECT_EQ(counts.at(FrameId{10}), 4);
+  EXPECT_EQ(counts.at(FrameId{40}), 0);
+}
+
 TEST(AverageRotations, BelievesTheMoreCertainEdge) {
   // Views 0 and 1 held at truth, view 2 pulled both ways by edges that differ by 0.2 deg.
   const double sigma = 0.5 * kRadFromDeg;
@@ -320,6 +460,12 @@ TEST(AveragingOptions, NamesTheFirstFieldOutOfRange) {
   using Options = AveragingOptions&;
   EXPECT_EQ(problem([](Options o) { o.window = 0; }), "window is 0, must be at least 1");
   EXPECT_TRUE(problem([](Options o) { o.edge_floor_deg = 0.0; }).starts_with("edge_floor_deg"));
+  EXPECT_TRUE(problem([](Options o) { o.mode = "on"; }).starts_with("mode is on"));
+  EXPECT_TRUE(problem([](Options o) { o.l1_iterations = -1; }).starts_with("l1_iterations"));
+  EXPECT_TRUE(problem([](Options o) { o.edge_error_factor = 0; }).starts_with("edge_error_factor"));
+  EXPECT_TRUE(problem([](Options o) { o.lasting_share = 1.1; }).starts_with("lasting_share"));
+  EXPECT_TRUE(problem([](Options o) { o.lasting_views = 0; }).starts_with("lasting_views"));
+  EXPECT_TRUE(problem([](Options o) { o.shared_noise = 1.1; }).starts_with("shared_noise"));
   EXPECT_TRUE(problem([](Options o) { o.loss_sigmas = -1.0; }).starts_with("loss_sigmas"));
   EXPECT_TRUE(problem([](Options o) { o.min_step_deg = NAN; }).starts_with("min_step_deg"));
   EXPECT_TRUE(problem([](Options o) { o.max_iterations = 0; }).starts_with("max_iterations"));

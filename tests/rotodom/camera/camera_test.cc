@@ -229,6 +229,33 @@ TEST(Camera, ProblemNamesTheField) {
   camera = good;
   camera.distortion[1] = 0.1;
   EXPECT_THAT(camera.Problem().value(), testing::HasSubstr("pinhole"));
+  for (const double readout_s : {-0.001, 1.0, 20.0, std::numeric_limits<double>::quiet_NaN()}) {
+    camera = good;
+    camera.readout_s = readout_s;
+    EXPECT_THAT(camera.Problem().value_or("none"), testing::StartsWith("readout_s is "));
+  }
+  camera = good;
+  camera.readout_s = 0.033;
+  EXPECT_EQ(camera.Problem(), std::nullopt);
+}
+
+TEST(Camera, AGlobalShutterExposesAllRowsAtOnce) {
+  const Camera camera = Cameras().front().camera;
+  EXPECT_EQ(camera.readout_s, 0.0);
+  for (const double y_px : {0.0, 100.0, 375.0}) EXPECT_EQ(camera.RowTime(y_px), 0.0);
+}
+
+TEST(Camera, ARollingShutterExposesRowAfterRow) {
+  Camera camera = Cameras().front().camera;
+  camera.readout_s = 0.03;
+  const double last = camera.height - 1;
+  EXPECT_NEAR(camera.RowTime(0.5 * last), 0.0, 1e-15);  // counted from the middle of the frame
+  // The readout ends with the last row's own share, which is less than a hundredth of it here.
+  EXPECT_NEAR(camera.RowTime(last) - camera.RowTime(0.0), camera.readout_s, 1e-2 * 0.03);
+  for (double y_px = 0.0; y_px < last; y_px += 7.5) {
+    EXPECT_LT(camera.RowTime(y_px), camera.RowTime(y_px + 1.0));
+    EXPECT_NEAR(camera.RowTime(y_px), -camera.RowTime(last - y_px), 1e-15);
+  }
 }
 
 TEST(Camera, DescribesItselfInOneLine) {
@@ -237,6 +264,9 @@ TEST(Camera, DescribesItselfInOneLine) {
   EXPECT_EQ(Describe(Cameras()[2].camera),
             "radtan, fx 458.654, fy 457.296, cx 367.215, cy 248.375, k1 -0.28340811, k2 "
             "0.07395907, p1 0.00019359, p2 1.76187114e-05, k3 0, 752x480");
+  Camera rolling = Cameras()[0].camera;
+  rolling.readout_s = 0.025;
+  EXPECT_EQ(Describe(rolling), Describe(Cameras()[0].camera) + ", rolling shutter 0.025 s");
 }
 
 }  // namespace

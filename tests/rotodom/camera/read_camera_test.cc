@@ -74,6 +74,42 @@ TEST_F(ReadCameraTest, OursGivesBackWhatWasWritten) {
   }
 }
 
+TEST_F(ReadCameraTest, OursKnowsTheReadoutOfARollingShutter) {
+  const std::string global =
+      "model: pinhole\nwidth: 640\nheight: 480\nfx: 500\nfy: 500\ncx: 320\ncy: 240\n";
+  EXPECT_EQ(Read(global).readout_s, 0.0);
+  EXPECT_EQ(Read(global + "readout_s: 0\n").readout_s, 0.0);
+  EXPECT_EQ(Read(global + "readout_s: 0.0213\n").readout_s, 0.0213);
+  EXPECT_THAT(Complaint(global + "readout_s: -0.01\n"), HasSubstr("readout_s is -0.01"));
+  EXPECT_THAT(Complaint(global + "readout_s: 1\n"), HasSubstr("readout_s is 1"));
+  EXPECT_THAT(Complaint(global + "readout_s: 21.3\n"), HasSubstr("readout_s is 21.3"));
+  EXPECT_THAT(Complaint(global + "readout_s: fast\n"), HasSubstr("readout_s"));
+  EXPECT_THAT(Complaint(global + "readout_s: .nan\n"), HasSubstr("readout_s"));
+  EXPECT_THAT(Complaint(global + "readout: 0.01\n"), HasSubstr("readout is no key"));
+
+  Camera camera = Read(global);
+  EXPECT_THAT(CameraYaml(camera), Not(HasSubstr("readout_s")));
+  for (const double readout_s : {1.0 / 30.0, 1e-9, 0.999}) {
+    camera.readout_s = readout_s;
+    WriteCameraYaml(folder_ / "camera.yaml", camera);
+    EXPECT_EQ(ReadCamera(folder_ / "camera.yaml"), camera) << CameraYaml(camera);
+  }
+  camera.readout_s = 1.5;
+  EXPECT_THROW(WriteCameraYaml(folder_ / "camera.yaml", camera), std::invalid_argument);
+}
+
+// The other kinds of file have no word for it, and one that is there by chance is not ours.
+TEST_F(ReadCameraTest, OthersSayNothingAboutTheShutter) {
+  for (const std::string text :
+       {"cam0: {camera_model: pinhole, distortion_model: none, distortion_coeffs: [],\n"
+        "  intrinsics: [458.6, 457.2, 367.2, 248.3], resolution: [752, 480], readout_s: 0.02}\n",
+        "%YAML:1.0\nCamera.fx: 700\nCamera.fy: 700\nCamera.cx: 600\nCamera.cy: 180\n"
+        "readout_s: 0.02\n",
+        "P0: 718 0 607 0 0 718 185 0 0 0 1 0\n"}) {
+    EXPECT_EQ(Read(text).readout_s, 0.0) << text;
+  }
+}
+
 TEST_F(ReadCameraTest, OrbSlam) {
   EXPECT_EQ(Read("%YAML:1.0\n\n# comment\nCamera.fx: 517.306408\nCamera.fy: 516.469215\n"
                  "Camera.cx: 318.643040\nCamera.cy: 255.313989\n\nCamera.k1: 0.262383\n"

@@ -41,10 +41,16 @@ class TexturedWorld {
 
   /// What the camera sees when turned by `cam_from_world`; exact to a fiftieth of a pixel.
   cv::Mat View(const Camera& camera, const Rotation& cam_from_world) const {
+    return ViewByRow(camera, [&](int) { return cam_from_world; });
+  }
+
+  /// The same where each row has an orientation of its own: cam_from_world(row).
+  template <class OrientationOfRow>
+  cv::Mat ViewByRow(const Camera& camera, const OrientationOfRow& cam_from_world) const {
     cv::Mat x(camera.height, camera.width, CV_32F);
     cv::Mat y(camera.height, camera.width, CV_32F);
-    const Rotation world_from_cam = cam_from_world.Inverse();
     for (int row = 0; row < camera.height; ++row) {
+      const Rotation world_from_cam = cam_from_world(row).Inverse();
       for (int column = 0; column < camera.width; ++column) {
         const Eigen::Vector3d ray =
             world_from_cam * *camera.Unproject(Eigen::Vector2d(column, row));

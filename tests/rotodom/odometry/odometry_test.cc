@@ -1,7 +1,9 @@
 #include "rotodom/odometry.h"
 
+#include <algorithm>
 #include <cmath>
 #include <stdexcept>
+#include <string>
 
 #include <gtest/gtest.h>
 
@@ -24,15 +26,17 @@ const SimulatedSequence& Handheld() {
 }
 
 struct OdometryRun {
-  RotationalOdometry odometry;
-  std::vector<FrameReport> reports;
+  OdometryResult result;
+  std::vector<FrameEstimate> estimates;
 };
 
 OdometryRun RunOn(const std::vector<cv::Mat>& images, int num_threads = 1, int stride = 1) {
-  OdometryRun run{RotationalOdometry(Handheld().camera, {}, 1, num_threads), {}};
+  RotationalOdometry odometry(Handheld().camera, {}, 1, num_threads);
+  OdometryRun run;
   for (std::size_t k = 0; k < images.size(); ++k) {
-    run.reports.push_back(run.odometry.AddFrame(
+    run.estimates.push_back(odometry.AddFrame(
         FrameId{stride * static_cast<int>(k)}, Handheld().truth[k].timestamp_s, images[k]));
+    run.result.Add(run.estimates.back(), true);
   }
   return run;
 }
@@ -57,9 +61,10 @@ double RelativeErrorDeg(const RotationMap& cam_from_world, int gap) {
   return std::sqrt(sum / count);
 }
 
-// Bands: twice what was measured when the tests were written, 0.011 and 0.037 deg.
+// Bands: above what has been measured since the tests were written, 0.011 to 0.015 and 0.028 to
+// 0.037 deg.
 TEST(RotationalOdometry, FollowsAHandheldCamera) {
-  const RotationMap& cam_from_world = HandheldRun().odometry.result().cam_from_world;
+  const RotationMap& cam_from_world = HandheldRun().result.cam_from_world;
   ASSERT_EQ(cam_from_world.size(), std::size_t(kNumFrames));
   const double rpe1_deg = RelativeErrorDeg(cam_from_world, 1);
   const double rpe8_deg = RelativeErrorDeg(cam_from_world, 8);
@@ -69,68 +74,125 @@ TEST(RotationalOdometry, FollowsAHandheldCamera) {
   RecordProperty("rpe8_deg", std::to_string(rpe8_deg));
 }
 
-TEST(RotationalOdometry, ReportsWhatEachFrameBrought) {
-  const auto& reports = HandheldRun().reports;
-  int num_edges = 0;
+TEST(RotationalOdometry, SaysWhatEachFrameBrought) {
+  const auto& estimates = HandheldRun().estimates;
+  std::size_t num_edges = 0;
   for (int k = 0; k < kNumFrames; ++k) {
-    EXPECT_EQ(reports[k].frame, FrameId{k});
-    EXPECT_GT(reports[k].num_features, 300);
-    EXPECT_EQ(reports[k].num_edges, std::min(k, ViewGraphOptions{}.window_frames));
-    EXPECT_FALSE(reports[k].predicted_only);
-    EXPECT_FALSE(reports[k].weak);
-    if (k > 0) {
-      EXPECT_GT(reports[k].num_inliers, ViewGraphOptions{}.min_edge_inliers);
+    const FrameEstimate& estimate = estimates[k];
+    EXPECT_EQ(estimate.frame, FrameId{k});
+    EXPECT_EQ(estimate.timestamp_s, Handheld().truth[k].timestamp_s);
+    EXPECT_GT(estimate.features.size(), 300);
+    EXPECT_FALSE(estimate.report.predicted_only);
+    EXPECT_FALSE(estimate.report.weak);
+    EXPECT_FALSE(estimate.report.searched_wide);
+    EXPECT_TRUE(estimate.revised_edges.empty());
+    // To the newest view first, then back, then to older keyframes.
+    const int num_recent = std::min(k, ViewGraphOptions{}.window_frames);
+    ASSERT_GE(static_cast<int>(estimate.connections.size()), num_recent);
+    EXPECT_LE(static_cast<int>(estimate.connections.size()),
+              num_recent + ViewGraphOptions{}.max_keyframe_edges);
+    for (int back = 1; back <= num_recent; ++back) {
+      EXPECT_EQ(estimate.connections[back - 1].edge.i, FrameId{k - back});
     }
-    num_edges += reports[k].num_edges;
+    if (k > 0) {
+      EXPECT_GT(estimate.report.num_tracked, 0.6 * estimates[k - 1].features.size());
+      EXPECT_LE(estimate.report.num_tracked, estimate.features.size());
+      EXPECT_GT(estimate.report.num_inliers, ViewGraphOptions{}.min_edge_inliers);
+    }
+    num_edges += estimate.connections.size();
   }
-  const RotationalOdometry& odometry = HandheldRun().odometry;
-  EXPECT_EQ(static_cast<int>(odometry.result().graph.edges().size()), num_edges);
-  ASSERT_EQ(odometry.result().edge_matches.size(), odometry.result().graph.edges().size());
-  for (const EdgeMatches& matches : odometry.result().edge_matches) {
-    const RelativeRotation* edge =
-        odometry.result().graph.FindEdge(matches.frame_i, matches.frame_j);
+  const OdometryResult& result = HandheldRun().result;
+  EXPECT_EQ(result.graph.edges().size(), num_edges);
+  ASSERT_EQ(result.edge_matches.size(), num_edges);
+  for (const EdgeMatches& matches : result.edge_matches) {
+    const RelativeRotation* edge = result.graph.FindEdge(matches.frame_i, matches.frame_j);
     ASSERT_NE(edge, nullptr);
     EXPECT_EQ(static_cast<int>(matches.pairs.size()), edge->num_inliers);
   }
-  EXPECT_EQ(odometry.result().features.size(), std::size_t(kNumFrames));
-  EXPECT_TRUE(odometry.result().features.at(FrameId{3}).descriptors.empty());
+  ASSERT_EQ(result.features.size(), std::size_t(kNumFrames));
+  EXPECT_TRUE(result.features.at(FrameId{3}).descriptors.empty());
+}
+
+TEST(RotationalOdometry, TracksAscendAndMatchesFollowThem) {
+  const OdometryResult& result = HandheldRun().result;
+  for (const auto& [frame, features] : result.features) {
+    ASSERT_EQ(features.tracks.size(), std::size_t(features.size()));
+    for (int n = 1; n < features.size(); ++n) {
+      ASSERT_LT(features.tracks[n - 1], features.tracks[n]);
+    }
+  }
+  for (const EdgeMatches& matches : result.edge_matches) {
+    for (const auto& [i, j] : matches.pairs) {
+      ASSERT_EQ(result.features.at(matches.frame_i).tracks[i],
+                result.features.at(matches.frame_j).tracks[j]);
+    }
+  }
+}
+
+// What a frame moves is the newest orientations, and those are as many as the window has room for.
+TEST(RotationalOdometry, OlderOrientationsAreSettled) {
+  const int room = AveragingOptions{}.window;
+  RotationMap so_far;
+  for (const FrameEstimate& estimate : HandheldRun().estimates) {
+    const int k = estimate.frame.value;
+    EXPECT_EQ(static_cast<int>(estimate.window.size()), std::clamp(k, 1, room));
+    EXPECT_GT(estimate.window.begin()->first.value, k - room);
+    EXPECT_EQ(estimate.window.at(estimate.frame).Quaternion().coeffs(),
+              estimate.cam_from_world.Quaternion().coeffs());
+    for (const auto& [frame, rotation] : estimate.window) so_far[frame] = rotation;
+  }
+  ASSERT_EQ(so_far.size(), HandheldRun().result.cam_from_world.size());
+  for (const auto& [frame, rotation] : HandheldRun().result.cam_from_world) {
+    EXPECT_EQ(rotation.Quaternion().coeffs(), so_far.at(frame).Quaternion().coeffs());
+  }
+}
+
+TEST(OdometryResult, LeavesFeaturesAndMatchesOutWhereAsked) {
+  OdometryResult result;
+  for (const FrameEstimate& estimate : HandheldRun().estimates) result.Add(estimate, false);
+  EXPECT_TRUE(result.features.empty());
+  EXPECT_TRUE(result.edge_matches.empty());
+  EXPECT_EQ(result.graph.edges().size(), HandheldRun().result.graph.edges().size());
+  EXPECT_EQ(result.cam_from_world.size(), HandheldRun().result.cam_from_world.size());
 }
 
 TEST(RotationalOdometry, TheFirstFrameIsTheWorld) {
-  const Rotation first = HandheldRun().odometry.result().cam_from_world.at(FrameId{0});
+  const Rotation first = HandheldRun().result.cam_from_world.at(FrameId{0});
   EXPECT_EQ(first.Quaternion().coeffs(), Rotation().Quaternion().coeffs());
 }
 
-void ExpectSameBytes(const RotationalOdometry& a, const RotationalOdometry& b) {
-  for (const auto& [frame, rotation] : a.result().cam_from_world) {
-    EXPECT_EQ(rotation.Quaternion().coeffs(),
-              b.result().cam_from_world.at(frame).Quaternion().coeffs());
+void ExpectSameBytes(const OdometryResult& a, const OdometryResult& b) {
+  for (const auto& [frame, rotation] : a.cam_from_world) {
+    EXPECT_EQ(rotation.Quaternion().coeffs(), b.cam_from_world.at(frame).Quaternion().coeffs());
   }
-  ASSERT_EQ(a.result().edge_matches.size(), b.result().edge_matches.size());
-  for (std::size_t k = 0; k < a.result().edge_matches.size(); ++k) {
-    EXPECT_EQ(a.result().edge_matches[k].pairs, b.result().edge_matches[k].pairs);
-    EXPECT_EQ(a.result().graph.edges()[k].covariance, b.result().graph.edges()[k].covariance);
+  ASSERT_EQ(a.edge_matches.size(), b.edge_matches.size());
+  ASSERT_EQ(a.graph.edges().size(), b.graph.edges().size());
+  for (std::size_t k = 0; k < a.edge_matches.size(); ++k) {
+    EXPECT_EQ(a.edge_matches[k].pairs, b.edge_matches[k].pairs);
+    EXPECT_EQ(a.graph.edges()[k].covariance, b.graph.edges()[k].covariance);
   }
-  for (const auto& [frame, features] : a.result().features) {
-    EXPECT_EQ(features.keypoints_px, b.result().features.at(frame).keypoints_px);
+  for (const auto& [frame, features] : a.features) {
+    EXPECT_EQ(features.keypoints_px, b.features.at(frame).keypoints_px);
   }
 }
 
 TEST(RotationalOdometry, SameBytesAtAnyThreadCount) {
-  ExpectSameBytes(HandheldRun().odometry, RunOn(Handheld().images, 2).odometry);
+  for (const int num_threads : {2, 5}) {
+    ExpectSameBytes(HandheldRun().result, RunOn(Handheld().images, num_threads).result);
+  }
 }
 
 TEST(RotationalOdometry, AnEmptyImageIsBridged) {
   std::vector<cv::Mat> images = Handheld().images;
   images[6] = cv::Mat();
   const OdometryRun run = RunOn(images);
-  EXPECT_TRUE(run.reports[6].predicted_only);
-  EXPECT_EQ(run.reports[6].num_edges, 0);
-  EXPECT_TRUE(run.odometry.result().graph.EdgesOf(FrameId{6}).empty());
-  ASSERT_TRUE(run.odometry.result().cam_from_world.contains(FrameId{6}));
-  for (int k = 7; k < kNumFrames; ++k) EXPECT_GE(run.reports[k].num_edges, 3);
+  EXPECT_TRUE(run.estimates[6].report.predicted_only);
+  EXPECT_TRUE(run.estimates[6].connections.empty());
+  EXPECT_TRUE(run.result.graph.EdgesOf(FrameId{6}).empty());
+  ASSERT_TRUE(run.result.cam_from_world.contains(FrameId{6}));
+  for (int k = 7; k < kNumFrames; ++k) EXPECT_GE(run.estimates[k].connections.size(), 3u);
   // Across the gap as good as without it; the gap itself as good as the prediction.
-  const RotationMap& cam_from_world = run.odometry.result().cam_from_world;
+  const RotationMap& cam_from_world = run.result.cam_from_world;
   const auto error_deg = [&](int i, int j) {
     const Rotation truth =
         Handheld().truth[j].world_from_cam.Inverse() * Handheld().truth[i].world_from_cam;
@@ -146,8 +208,8 @@ TEST(RotationalOdometry, AnEmptyImageIsBridged) {
 TEST(RotationalOdometry, FrameNumbersMayHaveGaps) {
   const OdometryRun sparse = RunOn(Handheld().images, 1, 10);
   // The numbers enter the seeds, so the bytes may differ and the answer may not.
-  for (const auto& [frame, rotation] : HandheldRun().odometry.result().cam_from_world) {
-    const Rotation other = sparse.odometry.result().cam_from_world.at(FrameId{10 * frame.value});
+  for (const auto& [frame, rotation] : HandheldRun().result.cam_from_world) {
+    const Rotation other = sparse.result.cam_from_world.at(FrameId{10 * frame.value});
     EXPECT_LT((rotation * other.Inverse()).AngleDeg(), 0.05);
   }
 }
@@ -155,12 +217,12 @@ TEST(RotationalOdometry, FrameNumbersMayHaveGaps) {
 TEST(RotationalOdometry, ABlackSequenceHasNoEdges) {
   const std::vector<cv::Mat> images(5, cv::Mat::zeros(240, 320, CV_8U));
   const OdometryRun run = RunOn(images);
-  EXPECT_TRUE(run.odometry.result().graph.edges().empty());
-  ASSERT_EQ(run.odometry.result().cam_from_world.size(), 5u);
+  EXPECT_TRUE(run.result.graph.edges().empty());
+  ASSERT_EQ(run.result.cam_from_world.size(), 5u);
   for (int k = 0; k < 5; ++k) {
-    EXPECT_EQ(run.reports[k].num_features, 0);
-    EXPECT_EQ(run.reports[k].predicted_only, k > 0);
-    EXPECT_EQ(run.odometry.result().cam_from_world.at(FrameId{k}).Angle(), 0.0);
+    EXPECT_EQ(run.estimates[k].features.size(), 0);
+    EXPECT_EQ(run.estimates[k].report.predicted_only, k > 0);
+    EXPECT_EQ(run.result.cam_from_world.at(FrameId{k}).Angle(), 0.0);
   }
 }
 
@@ -168,11 +230,11 @@ TEST(RotationalOdometry, GoesOnAfterTheLensWasCovered) {
   std::vector<cv::Mat> images = Handheld().images;
   for (int k = 3; k < 8; ++k) images[k] = cv::Mat::zeros(240, 320, CV_8U);  // more than the window
   const OdometryRun run = RunOn(images);
-  for (int k = 3; k < 8; ++k) EXPECT_TRUE(run.reports[k].predicted_only) << k;
-  for (int k = 8; k < kNumFrames; ++k) EXPECT_GE(run.reports[k].num_edges, 1) << k;
+  for (int k = 3; k < 8; ++k) EXPECT_TRUE(run.estimates[k].report.predicted_only) << k;
+  for (int k = 8; k < kNumFrames; ++k) EXPECT_GE(run.estimates[k].connections.size(), 1u) << k;
   // The frames before the dark ones still serve.
-  EXPECT_NE(run.odometry.result().graph.FindEdge(FrameId{2}, FrameId{8}), nullptr);
-  EXPECT_EQ(run.odometry.result().cam_from_world.size(), std::size_t(kNumFrames));
+  EXPECT_NE(run.result.graph.FindEdge(FrameId{2}, FrameId{8}), nullptr);
+  EXPECT_EQ(run.result.cam_from_world.size(), std::size_t(kNumFrames));
 }
 
 // From the bad prediction that five dark frames leave, a descent on the epipolar distance may end
@@ -182,7 +244,7 @@ TEST(RotationalOdometry, IsAsExactAfterTheLensWasCovered) {
   std::vector<cv::Mat> images = Handheld().images;
   for (int k = 3; k < 8; ++k) images[k] = cv::Mat::zeros(240, 320, CV_8U);
   const OdometryRun run = RunOn(images);
-  const RotationMap& cam_from_world = run.odometry.result().cam_from_world;
+  const RotationMap& cam_from_world = run.result.cam_from_world;
   const Rotation estimate =
       cam_from_world.at(FrameId{11}) * cam_from_world.at(FrameId{8}).Inverse();
   const Rotation truth =
@@ -196,6 +258,9 @@ TEST(RotationalOdometry, RejectsABrokenContract) {
   bad.matching.ratio = 2.0;
   EXPECT_THROW(RotationalOdometry(camera, bad, 1, 1), std::invalid_argument);
   EXPECT_THROW(RotationalOdometry(Camera{}, {}, 1, 1), std::invalid_argument);
+  Camera slow = camera;
+  slow.readout_s = 1.0;
+  EXPECT_THROW(RotationalOdometry(slow, {}, 1, 1), std::invalid_argument);
   RotationalOdometry odometry(camera, {}, 1, 1);
   odometry.AddFrame(FrameId{4}, 1.0, cv::Mat());
   EXPECT_THROW(odometry.AddFrame(FrameId{4}, 2.0, cv::Mat()), std::invalid_argument);

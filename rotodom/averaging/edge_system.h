@@ -1,0 +1,87 @@
+#pragma once
+
+#include <cstddef>
+#include <memory>
+#include <vector>
+
+#include <Eigen/Core>
+#include <Eigen/Geometry>
+
+#include "rotodom/types/view_graph.h"
+
+namespace rotslam {
+
+enum class EdgeLoss {
+  kL1,            // convex: wrong edges pull by their number, not by their size
+  kGemanMcClure,  // redescending: wrong edges do not pull at all
+};
+
+/// Robust least squares over relative rotations, made linear at the present orientations.
+///
+/// The unknowns are small turns of the cameras written in the world's frame,
+/// cam_from_world * Exp(turn). There an edge's residual is r + turn_j - turn_i, so that the normal
+/// equations are the weighted Laplacian of the graph: a step costs a few additions an edge and one
+/// Cholesky factorisation, dense for few unknown orientations and sparse for many.
+class EdgeSystem {
+ public:
+  /// An edge between two positions in the list of orientations, in the world's frame.
+  struct Term {
+    int i = 0;
+    int j = 0;
+    Eigen::Quaterniond i_from_j;       // measured
+    Eigen::Matrix3d information_in_j;  // inverse covariance in the frame of camera j
+    Eigen::Matrix3d information;       // the same in the world's frame
+    Eigen::Vector3d residual;          // Log(predicted * measured^-1), in the world's frame
+    double weight = 1.0;               // of the robust loss
+    Eigen::Matrix3d curvature;         // of the loss, what the edge adds to the normal equations
+  };
+
+  /// @param cam_from_world  orientations; the first `num_free` are unknown, the others held.
+  /// @param loss_sigmas     scale of the Geman-McClure loss, in standard deviations.
+  EdgeSystem(std::vector<Eigen::Quaterniond> cam_from_world, int num_free, double loss_sigmas);
+  EdgeSystem(EdgeSystem&&) noexcept;
+  ~EdgeSystem();
+
+  void Reserve(std::size_t num_edges) { terms_.reserve(num_edges); }
+  /// Adds an edge between positions i and j, at least one of them free; `covariance` of the error
+  /// delta in `Exp(delta) * j_from_i`.
+  void AddEdge(int i, int j, const Rotation& j_from_i, const Eigen::Matrix3d& covariance);
+
+  /// One re-weighted Gauss-Newton step. Returns the largest turn of an orientation in radians, or
+  /// a negative number when the equations have no finite solution (the orientations then stay).
+  double Step(EdgeLoss loss = EdgeLoss::kGemanMcClure);
+
+  /// Some free view's edges mostly contradict the present orientations: they lie beyond the loss'
+  /// scale. The last step must have been, or be preceded by, `Linearize`.
+  bool HasDoubtfulView() const;
+
+  /// Residuals and weights at the present orientations.
+  void Linearize(EdgeLoss loss = EdgeLoss::kGemanMcClure);
+
+  const std::vector<Term>& terms() const { return terms_; }
+  int num_free() const { return num_free_; }
+  /// Orientations with all steps applied.
+  Rotation CamFromWorld(int view) const;
+  /// Normal equations at the last `Linearize`, lower triangle, 3 num_free square.
+  Eigen::MatrixXd DenseNormalMatrix() const;
+
+ private:
+  struct Sparse;
+
+  void Reweight(EdgeLoss loss);
+  bool SolveDense();
+  bool SolveSparse();
+
+  int num_free_;
+  double squared_scale_;
+  std::vector<Eigen::Quaterniond> cam_from_world_;
+  std::vector<Eigen::Matrix3d> R_c_w_;
+  std::vector<Term> terms_;
+  Eigen::VectorXd turns_;  // since the last Linearize
+  Eigen::VectorXd step_;   // gradient, then solution
+  Eigen::MatrixXd dense_;
+  std::unique_ptr<Sparse> sparse_;
+  double last_turn_;
+};
+
+}  // namespace rotslam

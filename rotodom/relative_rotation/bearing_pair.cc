@@ -1,0 +1,23 @@
+#include "rotodom/relative_rotation/bearing_pair.h"
+
+#include <Eigen/Geometry>
+
+namespace rotslam {
+
+Eigen::Matrix<double, 3, 2> TangentBasis(const Eigen::Vector3d& direction) {
+  int smallest = 0;
+  direction.cwiseAbs().minCoeff(&smallest);
+  Eigen::Matrix<double, 3, 2> basis;
+  basis.col(0) = direction.cross(Eigen::Vector3d::Unit(smallest)).normalized();
+  basis.col(1) = direction.cross(basis.col(0));
+  return basis;
+}
+
+Eigen::Matrix2d TangentCovariance(const Eigen::Vector3d& bearing,
+                                  const Eigen::Matrix2d& image_covariance) {
+  // d bearing = z (I - f f^T) (dx, dy, 0), and the basis is perpendicular to f.
+  const Eigen::Matrix2d J = bearing.z() * TangentBasis(bearing).transpose().leftCols<2>();
+  return J * image_covariance * J.transpose();
+}
+
+}  // namespace rotslam

@@ -1,0 +1,41 @@
+#pragma once
+
+#include <optional>
+
+#include <Eigen/Core>
+
+namespace rotslam {
+
+/// How well a match is known, relative to a nominal match, whose two bearings err by the same
+/// amount in every direction and by one unit of variance. Only ratios between matches matter: the
+/// size of the unit is measured.
+struct MatchNoise {
+  // Covariance of bearing_j in the plane perpendicular to it, along the columns of
+  // TangentBasis(bearing_j); `TangentCovariance` makes it from one in the image.
+  Eigen::Matrix2d covariance_j = Eigen::Matrix2d::Identity();
+  // Variance of bearing_i, in every direction. Zero where covariance_j holds the whole error of the
+  // match, as that of a patch which was followed from view i to view j.
+  double variance_i = 1.0;
+};
+
+/// The same scene point seen from two cameras: unit bearings in camera i and camera j.
+struct BearingPair {
+  Eigen::Vector3d bearing_i;
+  Eigen::Vector3d bearing_j;
+  std::optional<MatchNoise> noise = std::nullopt;  // nullopt: a nominal match
+};
+
+/// Two unit vectors that span the plane perpendicular to `direction`, as columns; with `direction`
+/// they form an orthonormal basis.
+Eigen::Matrix<double, 3, 2> TangentBasis(const Eigen::Vector3d& direction);
+
+/// Carries the covariance of an image position to the bearing there.
+/// @param bearing           unit, in front of the camera (z > 0).
+/// @param image_covariance  2x2, of (x / z, y / z) or, the camera's distortion neglected, of
+/// pixels.
+/// @return  2x2 for MatchNoise::covariance_j, in the unit of `image_covariance`. One unit in the
+///          image becomes less than one on the sphere away from the optical axis.
+Eigen::Matrix2d TangentCovariance(const Eigen::Vector3d& bearing,
+                                  const Eigen::Matrix2d& image_covariance);
+
+}  // namespace rotslam

@@ -1,0 +1,305 @@
+#include "rotodom/relative_rotation/consensus.h"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <limits>
+#include <numbers>
+#include <optional>
+#include <random>
+#include <vector>
+
+#include <Eigen/Dense>
+
+#include "rotodom/relative_rotation/refinement.h"
+
+namespace rotslam {
+namespace {
+
+// Matches that descents run on.
+constexpr int kThinnedSize = 250;
+// Samples start from rotations up to this far from the best one. At the parallax of neighbouring
+// frames minima lie 1 deg from one another, at wide baselines farther.
+constexpr double kStartScatterDeg = 4.0;
+// One more than the five degrees of freedom.
+constexpr int kSmallSample = 6;
+
+int SamplesNeeded(double inlier_ratio, int sample_size, double confidence, int max_samples) {
+  const double all_good = std::pow(std::clamp(inlier_ratio, 0.0, 1.0), sample_size);
+  if (all_good > 1.0 - 1e-9) return 1;
+  if (all_good < 1e-12) return max_samples;
+  const double needed = std::log(1.0 - confidence) / std::log1p(-all_good);
+  return static_cast<int>(std::min<double>(max_samples, std::ceil(needed)));
+}
+
+class Sampler {
+ public:
+  explicit Sampler(std::uint64_t seed) : random_(seed) {}
+
+  // `count` different indices below `population`.
+  const std::vector<int>& Draw(int count, int population) {
+    drawn_.clear();
+    while (static_cast<int>(drawn_.size()) < count) {
+      const int index = static_cast<int>(random_() % static_cast<std::uint64_t>(population));
+      if (std::find(drawn_.begin(), drawn_.end(), index) == drawn_.end()) drawn_.push_back(index);
+    }
+    return drawn_;
+  }
+
+  // A vector inside the unit ball.
+  Eigen::Vector3d DrawInBall() {
+    const auto uniform = [&] { return static_cast<double>(random_() >> 11) * 0x1.0p-52 - 1.0; };
+    while (true) {
+      Eigen::Vector3d vector(uniform(), uniform(), uniform());
+      if (vector.squaredNorm() <= 1.0) return vector;
+    }
+  }
+
+ private:
+  std::mt19937_64 random_;
+  std::vector<int> drawn_;
+};
+
+// The frame that two bearings span: their sum, their difference, their normal.
+Eigen::Matrix3d FrameOf(const Eigen::Vector3d& a, const Eigen::Vector3d& b) {
+  Eigen::Matrix3d frame;
+  frame.col(0) = (a + b).normalized();
+  frame.col(1) = (a - b).normalized();
+  frame.col(2) = frame.col(0).cross(frame.col(1));
+  return frame;
+}
+
+// Rotation that best aligns two pairs; nullopt when bearings of a view are parallel.
+std::optional<Rotation> AlignTwo(const PairArrays& pairs, int first, int second) {
+  const Eigen::Matrix3d R = FrameOf(pairs.BearingJ(first), pairs.BearingJ(second)) *
+                            FrameOf(pairs.BearingI(first), pairs.BearingI(second)).transpose();
+  if (!(R.determinant() > 0.5)) return std::nullopt;
+  return Rotation(Eigen::Quaterniond(R));
+}
+
+// About `count` of the indices, evenly spread over their order.
+std::vector<int> Thinned(const std::vector<int>& indices, int count) {
+  const std::int64_t size = std::ssize(indices);
+  if (size <= count) return indices;
+  std::vector<int> thinned(count);
+  for (int k = 0; k < count; ++k) thinned[k] = indices[k * size / count];
+  return thinned;
+}
+
+double Quantile(std::vector<double> values, double part) {
+  const auto at =
+      values.begin() + static_cast<std::ptrdiff_t>(part * static_cast<double>(values.size() - 1));
+  std::nth_element(values.begin(), at, values.end());
+  return *at;
+}
+
+class Search {
+ public:
+  Search(const PairArrays& pairs, double focal_px, const RelativeRotationOptions& options)
+      : pairs_(pairs),
+        spread_(pairs.Thinned(kThinnedSize)),
+        options_(options),
+        threshold_(options.inlier_px / focal_px),
+        smallest_noise_(options.min_noise_px / focal_px),
+        finest_(options.finest_px / focal_px) {}
+
+  const Consensus& best() const { return best_; }
+
+  void DescendFrom(const Rotation& rotation) {
+    FocusOn(rotation);
+    const Eigen::Matrix3d axes = TranslationAxes(thinned_, rotation);
+    for (int k = 0; k < 3; ++k) DescendAndConsider({rotation, axes.col(k)});
+  }
+
+  void DescendFromAligned(const Rotation& start) {
+    // The scale comes down as the rotation explains more of the matches.
+    constexpr int kScales = 5;
+    Rotation rotation = start;
+    for (int k = 0; k < kScales; ++k) {
+      const double scale = std::max(threshold_, TypicalFlow(rotation));
+      rotation = RefineRotation(spread_, rotation, scale, 2).j_from_i;
+    }
+    DescendFrom(rotation);
+  }
+
+  void Sample(std::uint64_t seed) {
+    Sampler sampler(seed);
+    FocusOnBest();
+    for (best_.num_samples = 0; best_.num_samples < SamplesNeededNow(); ++best_.num_samples) {
+      bool improved = false;
+      // Two bearings fix a rotation when the baseline is small: cheap, and the way out of a bad
+      // prediction.
+      const std::vector<int>& two = sampler.Draw(2, pairs_.size());
+      if (const std::optional<Rotation> rotation = AlignTwo(pairs_, two[0], two[1])) {
+        improved |= Consider({*rotation, best_.model.direction});
+      }
+      // Large samples bear noise and small baselines better, small ones miss the wrong matches more
+      // often. So the large ones are drawn from what nearly agrees with the best model, which is
+      // mostly right also where the model is at a false minimum, and the small ones from all.
+      const bool large = best_.num_samples % 2 == 0;
+      const std::vector<int>& from = large ? agreeing_ : near_;
+      const int num_from = static_cast<int>(from.size());
+      const int size = large ? options_.sample_size : kSmallSample;
+      std::vector<int> drawn = sampler.Draw(std::min(size, num_from), num_from);
+      for (int& index : drawn) index = from[index];
+      const Rotation start = Rotation::Exp(kStartScatterDeg * kRadFromDeg * sampler.DrawInBall()) *
+                             best_.model.j_from_i;
+      improved |= Consider(FitSample(PairArrays(pairs_, drawn), start));
+      if (improved) {
+        FocusOn(best_.model.j_from_i);
+        DescendAndConsider(best_.model);
+        FocusOnBest();
+      }
+    }
+  }
+
+ private:
+  // Takes the model if it is better than the best so far.
+  bool Consider(const EpipolarModel& model) {
+    const HypothesisScore score = ScoreEpipolar(pairs_, model, threshold_, finest_, best_score_);
+    if (!(score.score < best_score_)) return false;
+    best_score_ = score.score;
+    best_.model = model;
+    best_.num_inliers = score.num_inliers;
+    return true;
+  }
+
+  // Length of flow that a good part of the matches stay below, rad.
+  double TypicalFlow(const Rotation& rotation) const {
+    constexpr double kPart = 0.3;
+    return std::sqrt(Quantile(SquaredFlows(spread_, rotation), kPart));
+  }
+
+  // Leaves to descents and samples the matches whose flow under the rotation is not out of all
+  // proportion. Most of the others are wrong; each such match has a direction of translation that
+  // suits it near to any given one, and its long flow makes that a sharp minimum.
+  void FocusOn(const Rotation& rotation) {
+    constexpr double kProportion = 6.0;
+    const double longest = kProportion * (threshold_ + TypicalFlow(rotation));
+    const std::vector<double> squared_flows = SquaredFlows(pairs_, rotation);
+    near_.clear();
+    for (int k = 0; k < pairs_.size(); ++k) {
+      if (squared_flows[k] <= longest * longest) near_.push_back(k);
+    }
+    thinned_ = PairArrays(pairs_, Thinned(near_, kThinnedSize));
+  }
+
+  // The same for the best model, and finds the matches that nearly agree with it.
+  void FocusOnBest() {
+    constexpr double kNearly = 4.0;
+    FocusOn(best_.model.j_from_i);
+    const double limit = kNearly * kNearly * threshold_ * threshold_;
+    const std::vector<double> squared_distances = SquaredDistances(pairs_, best_.model);
+    agreeing_.clear();
+    for (const int k : near_) {
+      if (squared_distances[k] < limit) agreeing_.push_back(k);
+    }
+  }
+
+  static EpipolarModel FitSample(const PairArrays& sample, const Rotation& start) {
+    constexpr int kIterations = 8;
+    constexpr double kNoLoss = 1.0;
+    const EpipolarModel model{start, TranslationAxes(sample, start).col(0)};
+    return RefineEpipolar(sample, model, kNoLoss, kIterations, 1e-3).model;
+  }
+
+  // Refines at the scale of the noise that the model itself shows, again and again as that comes
+  // down, and considers the result. Stops where an earlier descent has been.
+  void DescendAndConsider(EpipolarModel model) {
+    constexpr int kScales = 3;
+    constexpr int kIterations = 4;
+    for (int k = 0; k < kScales; ++k) {
+      if (k > 0 && IsKnown(model)) return;
+      const double noise = NoiseOf(SquaredDistances(thinned_, model), threshold_, smallest_noise_);
+      model =
+          RefineEpipolar(thinned_, model, options_.loss_sigmas * noise, kIterations, 1e-3).model;
+    }
+    minima_.push_back(model);
+    Consider(model);
+  }
+
+  bool IsKnown(const EpipolarModel& model) const {
+    constexpr double kSameDirection = 0.9998;  // cosine of 1 deg
+    const double same_angle = 0.1 * threshold_;
+    return std::any_of(minima_.begin(), minima_.end(), [&](const EpipolarModel& minimum) {
+      return std::abs(minimum.direction.dot(model.direction)) > kSameDirection &&
+             (minimum.j_from_i * model.j_from_i.Inverse()).Angle() < same_angle;
+    });
+  }
+
+  int SamplesNeededNow() const {
+    const double ratio = static_cast<double>(best_.num_inliers) / static_cast<double>(near_.size());
+    const int sample_size = kSmallSample;
+    const int needed = SamplesNeeded(ratio, sample_size, options_.confidence, options_.max_samples);
+    return std::max(needed, std::min(options_.min_samples, options_.max_samples));
+  }
+
+  const PairArrays& pairs_;
+  const PairArrays spread_;  // some of all
+  const RelativeRotationOptions& options_;
+  const double threshold_;
+  const double smallest_noise_;
+  const double finest_;
+
+  std::vector<int> near_;              // see FocusOn
+  std::vector<int> agreeing_;          // see FocusOnBest
+  PairArrays thinned_;                 // some of them
+  std::vector<EpipolarModel> minima_;  // that descents have reached
+  Consensus best_;
+  double best_score_ = std::numeric_limits<double>::infinity();
+};
+
+// Positions of the pairs that are no likely victims of chance. A wrong match whose flow is `length`
+// and points anywhere has a distance below the threshold with the probability of an angle, and the
+// longer its flow, the more such a match pretends to know. So where the wrong matches of a length
+// explain a good part of those that agree, all of that length are left out. Close points, of long
+// flow too, stay as long as they outnumber that.
+std::vector<int> WithoutChance(const PairArrays& pairs,
+                               const EpipolarModel& model,
+                               double threshold) {
+  // Lengths by powers of two in units of the threshold; shorter flows prove nothing wrong.
+  constexpr int kShortest = 2;
+  constexpr int kBins = 16;
+  constexpr double kLargestPart = 0.05;
+  const std::vector<double> squared_distances = SquaredDistances(pairs, model);
+  const std::vector<double> squared_flows = SquaredFlows(pairs, model.j_from_i);
+  std::vector<int> bin_of_pair(pairs.size());
+  std::array<int, kBins> agree = {};
+  std::array<int, kBins> disagree = {};
+  for (int k = 0; k < pairs.size(); ++k) {
+    const int power = std::ilogb(std::sqrt(squared_flows[k]) / threshold);
+    bin_of_pair[k] = std::clamp(power, 0, kBins - 1);
+    ++(squared_distances[k] < threshold * threshold ? agree : disagree)[bin_of_pair[k]];
+  }
+  std::array<bool, kBins> trusted = {};
+  for (int bin = 0; bin < kBins; ++bin) {
+    // r = length * sin(angle) / sqrt(2), both views' noise being in its unit.
+    const double sine = std::numbers::sqrt2 / std::exp2(bin + 0.5);
+    const double chance = 2.0 / std::numbers::pi * std::asin(std::min(sine, 1.0));
+    const double by_chance = disagree[bin] * chance / (1.0 - chance);
+    trusted[bin] = bin < kShortest || by_chance <= kLargestPart * agree[bin];
+  }
+  std::vector<int> members;
+  for (int k = 0; k < pairs.size(); ++k) {
+    if (trusted[bin_of_pair[k]]) members.push_back(k);
+  }
+  return members;
+}
+
+}  // namespace
+
+Consensus FindConsensus(const PairArrays& pairs,
+                        const Rotation& predicted_j_from_i,
+                        double focal_px,
+                        const RelativeRotationOptions& options,
+                        std::uint64_t seed) {
+  Search search(pairs, focal_px, options);
+  search.DescendFrom(predicted_j_from_i);
+  search.DescendFromAligned(predicted_j_from_i);
+  search.Sample(seed);
+  Consensus best = search.best();
+  best.members = WithoutChance(pairs, best.model, options.inlier_px / focal_px);
+  return best;
+}
+
+}  // namespace rotslam

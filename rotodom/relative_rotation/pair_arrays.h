@@ -1,0 +1,110 @@
+#pragma once
+
+#include <span>
+#include <vector>
+
+#include <Eigen/Core>
+
+#include "rotodom/relative_rotation/bearing_pair.h"
+#include "rotodom/types/rotation.h"
+
+namespace rotslam {
+
+/// Rotation and direction of translation between two views: x_j = R x_i + s t. The sign of the
+/// direction does not matter here.
+struct EpipolarModel {
+  Rotation j_from_i;
+  Eigen::Vector3d direction = Eigen::Vector3d::UnitX();  // unit
+};
+
+/// Bearing pairs, one array per coordinate, as the loops below want them. Immutable.
+class PairArrays {
+ public:
+  PairArrays() = default;
+  explicit PairArrays(const std::vector<BearingPair>& pairs);
+  /// Some of the pairs, in the order of `indices`.
+  PairArrays(const PairArrays& all, std::span<const int> indices);
+
+  /// About `count` of the pairs, evenly spread over their order.
+  PairArrays Thinned(int count) const;
+
+  int size() const { return size_; }
+  /// Whether a pair has a MatchNoise; the nominal ones among them are then spelt out.
+  bool weighted() const { return weighted_; }
+  /// Length of an array: size() and zeros up to a multiple of kLanes.
+  int padded_size() const { return padded_size_; }
+  /// Coordinate `row` of all pairs, see Row.
+  const double* row(int row) const { return data_.data() + std::ptrdiff_t{row} * padded_size_; }
+
+  Eigen::Vector3d BearingI(int index) const;
+  Eigen::Vector3d BearingJ(int index) const;
+
+  static constexpr int kLanes = 4;
+  enum Row {
+    kBearingI = 0,                    // 3
+    kBearingJ = 3,                    // 3
+    kNominalRows = 6,                 // all there is unless weighted()
+    kCovarianceJ = kNominalRows,      // 6: upper triangle, 3x3, tangential block as given and 1
+                                      // along the bearing, so that a nominal pair has I
+    kVarianceI = kCovarianceJ + 6,    // 1
+    kInformation = kVarianceI + 1,    // 6: upper triangle of the inverse of the mean of both views'
+    kWeightedRows = kInformation + 6  //    covariances
+  };
+
+ private:
+  void Allocate(int size, bool weighted);
+  double* MutableRow(int row) { return data_.data() + std::ptrdiff_t{row} * padded_size_; }
+
+  int size_ = 0;
+  int padded_size_ = 0;
+  bool weighted_ = false;
+  std::vector<double> data_;
+};
+
+/// Normal equations of the robust Sampson distances.
+struct EpipolarNormal {
+  Eigen::Matrix<double, 5, 5> H;         // rotation (left, rad), direction (along TangentBasis)
+  Eigen::Matrix<double, 5, 1> gradient;  // half of the cost's
+  double cost = 0.0;                     // sum of loss^2 r^2 / (loss^2 + r^2), Geman-McClure
+};
+
+/// Normal equations of the robust differences R f_i - f_j.
+struct RotationNormal {
+  Eigen::Matrix3d H;
+  Eigen::Vector3d gradient;
+};
+
+/// What a hypothesis is worth.
+struct HypothesisScore {
+  double score = 0.0;   // smaller is better
+  int num_inliers = 0;  // only counted to the end when the score stayed below the limit
+};
+
+// The loops over all pairs. They use AVX2 where the machine has it.
+//
+// The Sampson distance of a pair is r = t . (g x f) / sqrt(D), g = R f_i, f = f_j, where D is the
+// variance of the numerator for nominal noise (Muhle et al., The Probabilistic Normal Epipolar
+// Constraint, CVPR 2022): D = v_i |t x f|^2 + (t x g)^T C_j (t x g) + a floor near the epipole,
+// where the distance has no meaning. It is in radians of a nominal match.
+
+EpipolarNormal LinearizeEpipolar(const PairArrays& pairs, const EpipolarModel& model, double loss);
+
+RotationNormal LinearizeRotation(const PairArrays& pairs, const Rotation& j_from_i, double loss);
+
+/// Sum of log(1 + r^2 / finest^2), cut off at `threshold`. A match is worth more the nearer it is
+/// at every scale above `finest`, so that two models which share their inliers are told apart by
+/// the matches' own noise, whatever that is. Gives up once the sum reaches `limit`.
+HypothesisScore ScoreEpipolar(const PairArrays& pairs,
+                              const EpipolarModel& model,
+                              double threshold,
+                              double finest,
+                              double limit);
+
+/// Squared Sampson distances, size() of them; those of pairs that point in opposite directions are
+/// infinite.
+std::vector<double> SquaredDistances(const PairArrays& pairs, const EpipolarModel& model);
+
+/// Squared lengths of R f_i - f_j, size() of them, each per nominal variance of one view.
+std::vector<double> SquaredFlows(const PairArrays& pairs, const Rotation& j_from_i);
+
+}  // namespace rotslam

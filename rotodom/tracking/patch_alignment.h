@@ -1,0 +1,61 @@
+#pragma once
+
+#include <array>
+#include <optional>
+
+#include <Eigen/Core>
+#include <opencv2/core.hpp>
+
+namespace rotslam {
+
+/// Side of a patch in pixels. 11 keeps the aperture open at nearly all corners; smaller sides lose
+/// accuracy faster than they gain time, larger ones straddle depth edges.
+inline constexpr int kPatchSide = 11;
+
+/// The grey values around a keypoint, prepared for alignment.
+///
+/// Gradients are made orthogonal to a constant and to the patch itself, so that neither a change
+/// of brightness nor one of contrast moves the answer.
+class PatchTemplate {
+ public:
+  /// Samples `image` around `center_px`.
+  /// @param patch_from_view  2x2, maps offsets in `image` to offsets in the image that the patch
+  /// will be sought in: the turn and stretch between the two views.
+  /// @return  nullopt where the patch leaves the image or has no structure in some direction.
+  static std::optional<PatchTemplate> Sample(const cv::Mat& image,
+                                             const Eigen::Vector2d& center_px,
+                                             const Eigen::Matrix2d& patch_from_view);
+
+ private:
+  friend struct PatchAligner;
+
+  // Rows are padded to whole vector registers; what is beyond kPatchSide is zero.
+  static constexpr int kStride = 12;
+  using Plane = std::array<float, static_cast<std::size_t>(kPatchSide) * kStride>;
+
+  alignas(16) Plane values_;  // mean removed
+  alignas(16) Plane gradient_x_;
+  alignas(16) Plane gradient_y_;
+  float energy_ = 0.0F;      // sum of squared values
+  float noise_left_ = 1.0F;  // share of the image noise's variance that sampling has left
+  Eigen::Matrix2f inverse_hessian_;
+};
+
+/// Where a patch was found.
+struct PatchAlignment {
+  Eigen::Vector2d center_px;
+  double correlation = 0.0;    // zero-mean normalised, 1 is a perfect match
+  Eigen::Matrix2d covariance;  // of center_px, px^2, from the patch's structure and the residual
+};
+
+/// Moves a patch from `start_px` to where `image` looks most like it.
+/// @return  nullopt when it leaves the image, or more than `max_step_px` from the start.
+/// Error:   about 0.02 px on clean images (patch alignment tests).
+/// Source:  Baker & Matthews, Lucas-Kanade 20 Years On, IJCV 2004 (inverse compositional); ours
+///          projects offset and gain out of the gradients.
+std::optional<PatchAlignment> AlignPatch(const PatchTemplate& patch,
+                                         const cv::Mat& image,
+                                         const Eigen::Vector2d& start_px,
+                                         double max_step_px);
+
+}  // namespace rotslam

@@ -1,0 +1,103 @@
+#include "rotodom/tracking/recovery.h"
+
+#include <algorithm>
+
+#include "rotodom/tracking/patch_alignment.h"
+
+namespace rotslam {
+namespace {
+
+// The corner of `target` that was matched, moved to where the patch of `view` fits if it does.
+PatchAlignment SharpenedPosition(const View& view,
+                                 int index,
+                                 const Eigen::Matrix2d& target_from_view,
+                                 const ImagePyramid& target,
+                                 const Eigen::Vector2d& corner_px,
+                                 double min_correlation) {
+  constexpr double kReachPx = 3.0;
+  PatchAlignment corner{corner_px, 0.0, Eigen::Matrix2d::Identity()};
+  const auto patch = PatchTemplate::Sample(
+      view.pyramid.levels.front(), view.features.keypoints_px[index], target_from_view);
+  if (!patch) return corner;
+  const auto found = AlignPatch(*patch, target.levels.front(), corner_px, kReachPx);
+  return found && found->correlation >= min_correlation ? *found : corner;
+}
+
+// Matches one view's points against the target's corners, which have been described.
+std::optional<Recovery> RecoverFrom(std::span<const OrientedView> views,
+                                    int v,
+                                    const Features& corners,
+                                    const TrackingTarget& target,
+                                    const Camera& camera,
+                                    const RecoveryOptions& options) {
+  const View& view = *views[v].view;
+  Features described = view.features;
+  DescribeFeatures(view.pyramid, options.num_threads, described);
+  const Rotation predicted = target.cam_from_world * views[v].cam_from_world.Inverse();
+  const Matches matches = MatchFeatures(described, corners, predicted, camera, options.matching);
+  std::vector<BearingPair> pairs;
+  for (const Match& match : matches.matches) {
+    pairs.push_back({described.bearings[match.i.value], corners.bearings[match.j.value]});
+  }
+  const auto estimate = EstimateRelativeRotation(
+      pairs, predicted, camera.MeanFocal(), options.relative_rotation, options.seed);
+  if (!estimate) return std::nullopt;
+  std::vector<BearingPair> agreeing;
+  for (const int inlier : estimate->inliers) agreeing.push_back(pairs[inlier]);
+  // The rotation alone is the better guide: it does not mistake a turn for a translation.
+  const Rotation target_from_view = AlignMostBearings(agreeing).value_or(estimate->j_from_i);
+
+  const cv::Mat& image = target.pyramid->levels.front();
+  Recovery recovery{target_from_view * views[v].cam_from_world,
+                    FlowField(image.cols, image.rows),
+                    estimate->j_from_i * views[v].cam_from_world,
+                    {},
+                    matches.range};
+  for (const int inlier : estimate->inliers) {
+    const int index = matches.matches[inlier].i.value;
+    const Eigen::Vector2d& corner_px = corners.keypoints_px[matches.matches[inlier].j.value];
+    const PatchAlignment found =
+        SharpenedPosition(view,
+                          index,
+                          PatchWarp(camera, described.bearings[index], target_from_view),
+                          *target.pyramid,
+                          corner_px,
+                          options.tracking.min_correlation);
+    const auto turned_px = camera.Project(target_from_view * described.bearings[index]);
+    if (turned_px) {
+      recovery.flow.Add(described.keypoints_px[index],
+                        (found.center_px - *turned_px) / (target.timestamp_s - view.timestamp_s));
+    }
+    if (view.is_lost[index]) continue;
+    recovery.points.push_back(
+        {described.tracks[index], v, index, found.center_px, found.covariance});
+  }
+  std::sort(recovery.points.begin(), recovery.points.end(), [](const auto& a, const auto& b) {
+    return a.track < b.track;
+  });
+  return recovery;
+}
+
+}  // namespace
+
+std::optional<Recovery> RecoverMotion(std::span<const OrientedView> views,
+                                      const TrackingTarget& target,
+                                      const Camera& camera,
+                                      const RecoveryOptions& options) {
+  Features corners;
+  DetectFeatures(*target.pyramid, camera, options.features, options.num_threads, corners);
+  DescribeFeatures(*target.pyramid, options.num_threads, corners);
+  const auto num_points = [](const std::optional<Recovery>& recovery) {
+    return recovery ? static_cast<int>(recovery->points.size()) : -1;
+  };
+  std::optional<Recovery> best;
+  for (int v = 0; v < static_cast<int>(views.size()); ++v) {
+    std::optional<Recovery> recovery = RecoverFrom(views, v, corners, target, camera, options);
+    if (num_points(recovery) > num_points(best)) best = std::move(recovery);
+    // Few points may agree by chance: then an older view is asked as well.
+    if (num_points(best) >= options.tracking.min_points) break;
+  }
+  return best;
+}
+
+}  // namespace rotslam

@@ -1,0 +1,42 @@
+#pragma once
+
+#include <cstdint>
+#include <optional>
+#include <span>
+#include <vector>
+
+#include "rotodom/matching/matching.h"
+#include "rotodom/relative_rotation/relative_rotation.h"
+#include "rotodom/tracking/tracking.h"
+
+namespace rotslam {
+
+/// How the camera moved, found without a prediction to rely on.
+struct Recovery {
+  Rotation guide_cam_from_world;     // aligns the matches best, as if nothing had moved
+  FlowField flow;                    // what that leaves
+  Rotation cam_from_world;           // by the epipolar constraint
+  std::vector<TrackedPoint> points;  // those matched, ascending in `track`
+  SearchRange range = SearchRange::kGuided;
+};
+
+struct RecoveryOptions {
+  FeatureOptions features;
+  MatchingOptions matching;
+  RelativeRotationOptions relative_rotation;
+  TrackingOptions tracking;
+  std::uint64_t seed = 1;
+  int num_threads = 1;
+};
+
+/// Matches the target's ORB features against those of `views`, one view after the other, until
+/// tracking.min_points matches agree on a relative rotation, and takes the view with the most: the
+/// way back when tracking has failed.
+/// @param views  newest first.
+/// @return  nullopt when no view matches.
+std::optional<Recovery> RecoverMotion(std::span<const OrientedView> views,
+                                      const TrackingTarget& target,
+                                      const Camera& camera,
+                                      const RecoveryOptions& options);
+
+}  // namespace rotslam

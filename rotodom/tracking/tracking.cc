@@ -1,0 +1,305 @@
+#include "rotodom/tracking/tracking.h"
+
+#include <algorithm>
+#include <cmath>
+#include <stdexcept>
+
+#include <Eigen/Dense>
+
+#include "rotodom/relative_rotation/normal_epipolar.h"
+#include "rotodom/tracking/patch_alignment.h"
+#include "rotodom/types/options.h"
+#include "rotodom/types/parallel.h"
+
+namespace rotslam {
+namespace {
+
+// How far a patch may move on a coarse and on the finest level, in pixels of that level.
+constexpr double kCoarseReachPx = 5.0;
+constexpr double kFineReachPx = 3.0;
+// Positions that two references give agree within this, or the older one shows something else.
+constexpr double kSamePointPx = 1.0;
+// Smaller turns leave a patch as it is.
+constexpr double kTurnThatShowsDeg = 1.0;
+constexpr int kPatchBorderPx = 6;
+
+struct Candidate {
+  TrackId track;
+  int view = 0;
+  int index = 0;
+};
+
+// Every point that is still followed, by the newest view that shows it; ascending in `track`.
+std::vector<Candidate> FindCandidates(std::span<const OrientedView> views, int max_points) {
+  std::vector<Candidate> candidates;
+  for (int view = 0; view < static_cast<int>(views.size()); ++view) {
+    const Features& features = views[view].view->features;
+    for (int index = 0; index < features.size(); ++index) {
+      candidates.push_back({features.tracks[index], view, index});
+    }
+  }
+  std::stable_sort(candidates.begin(),
+                   candidates.end(),
+                   [](const Candidate& a, const Candidate& b) { return a.track < b.track; });
+  const auto last =
+      std::unique(candidates.begin(), candidates.end(), [](const Candidate& a, const Candidate& b) {
+        return a.track == b.track;
+      });
+  candidates.erase(last, candidates.end());
+  std::erase_if(candidates, [&](const Candidate& candidate) {
+    return views[candidate.view].view->is_lost[candidate.index];
+  });
+  auto room = max_points - std::count_if(candidates.begin(), candidates.end(), [](const auto& c) {
+                return c.view == 0;
+              });
+  std::erase_if(candidates,
+                [&](const Candidate& candidate) { return candidate.view > 0 && --room < 0; });
+  return candidates;
+}
+
+// Position in `features` of `track`, -1 when the frame does not show it.
+int FindTrack(const Features& features, TrackId track) {
+  const auto found = std::lower_bound(features.tracks.begin(), features.tracks.end(), track);
+  if (found == features.tracks.end() || *found != track) return -1;
+  return static_cast<int>(found - features.tracks.begin());
+}
+
+struct Location {
+  Eigen::Vector2d px;
+  Eigen::Matrix2d covariance_px;
+};
+
+class Search {
+ public:
+  Search(std::span<const OrientedView> views,
+         const TrackingTarget& target,
+         const Camera& camera,
+         const TrackingOptions& options)
+      : views_(views), target_(target), camera_(camera), options_(options) {
+    const int num_levels = static_cast<int>(target.pyramid->levels.size());
+    coarsest_ = num_levels - 1;
+    middle_ = num_levels / 2;
+    SetOrientation(target.cam_from_world);
+  }
+
+  void SetOrientation(const Rotation& cam_from_world) {
+    target_from_view_.clear();
+    turns_patches_.clear();
+    for (const OrientedView& view : views_) {
+      target_from_view_.push_back(cam_from_world * view.cam_from_world.Inverse());
+      turns_patches_.push_back(target_from_view_.back().AngleDeg() > kTurnThatShowsDeg);
+    }
+  }
+
+  // Where the point should show; nullopt outside the image.
+  std::optional<Eigen::Vector2d> Expect(const Candidate& candidate) const {
+    const View& view = *views_[candidate.view].view;
+    const Eigen::Vector3d bearing =
+        target_from_view_[candidate.view] * view.features.bearings[candidate.index];
+    std::optional<Eigen::Vector2d> px = camera_.Project(bearing);
+    if (!px) return std::nullopt;
+    double ahead_s = target_.timestamp_s - view.timestamp_s;
+    if (camera_.readout_s > 0.0) {
+      const double late_s = camera_.RowTime(px->y());
+      px = camera_.Project(Rotation::Exp(late_s * target_.rate) * bearing);
+      if (!px) return std::nullopt;
+      ahead_s += late_s;
+    }
+    const Eigen::Vector2d flow = target_.flow
+                                     ? target_.flow->At(view.features.keypoints_px[candidate.index])
+                                     : view.flow_px_per_s[candidate.index];
+    *px += flow * ahead_s;
+    if (!IsInside(*px)) return std::nullopt;
+    return px;
+  }
+
+  // A rough position, from further away.
+  std::optional<Eigen::Vector2d> Probe(const Candidate& candidate, Eigen::Vector2d px) const {
+    bool found = false;
+    for (const int level : {coarsest_, middle_}) {
+      const auto alignment = Align(candidate.view, candidate.index, level, px, kCoarseReachPx);
+      found = alignment.has_value();
+      if (alignment) px = alignment->px;
+    }
+    if (!found) return std::nullopt;
+    return px;
+  }
+
+  std::optional<Location> Locate(const Candidate& candidate, Eigen::Vector2d px) const {
+    if (const auto rough = Align(candidate.view, candidate.index, middle_, px, kCoarseReachPx)) {
+      px = rough->px;
+    }
+    const auto first = Align(candidate.view, candidate.index, 0, px, kFineReachPx);
+    if (!first) return std::nullopt;
+    Eigen::Vector2d sum = first->px;
+    int count = 1;
+    for (int view = static_cast<int>(views_.size()) - 1;
+         view > candidate.view && count < options_.num_references;
+         --view) {
+      const int index = FindTrack(views_[view].view->features, candidate.track);
+      if (index < 0) continue;
+      const auto again = Align(view, index, 0, first->px, kSamePointPx);
+      if (!again) continue;
+      sum += again->px;
+      ++count;
+    }
+    const Eigen::Vector2d mean = sum / count;
+    if (!IsInside(mean)) return std::nullopt;
+    return Location{mean, first->covariance_px};
+  }
+
+ private:
+  bool IsInside(const Eigen::Vector2d& px) const {
+    const cv::Mat& image = target_.pyramid->levels.front();
+    return px.x() >= kPatchBorderPx && px.y() >= kPatchBorderPx &&
+           px.x() < image.cols - 1 - kPatchBorderPx && px.y() < image.rows - 1 - kPatchBorderPx;
+  }
+
+  std::optional<Location> Align(
+      int view_index, int index, int level, const Eigen::Vector2d& px, double reach_px) const {
+    const View& view = *views_[view_index].view;
+    const Eigen::Matrix2d warp =
+        turns_patches_[view_index]
+            ? PatchWarp(camera_, view.features.bearings[index], target_from_view_[view_index])
+            : Eigen::Matrix2d(Eigen::Matrix2d::Identity());
+    const auto patch =
+        PatchTemplate::Sample(view.pyramid.levels[level],
+                              view.pyramid.ToLevel(view.features.keypoints_px[index], level),
+                              warp);
+    if (!patch) return std::nullopt;
+    const auto found = AlignPatch(
+        *patch, target_.pyramid->levels[level], target_.pyramid->ToLevel(px, level), reach_px);
+    if (!found || found->correlation < options_.min_correlation) return std::nullopt;
+    const Eigen::Matrix2d scale = target_.pyramid->scales[level].asDiagonal();
+    return Location{target_.pyramid->ToImage(found->center_px, level),
+                    scale * found->covariance * scale};
+  }
+
+  std::span<const OrientedView> views_;
+  const TrackingTarget& target_;
+  const Camera& camera_;
+  const TrackingOptions& options_;
+  int coarsest_ = 0;
+  int middle_ = 0;
+  std::vector<Rotation> target_from_view_;
+  std::vector<bool> turns_patches_;
+};
+
+// The turn of the camera that most of the probes show beside the expected one.
+Rotation ProbeRotation(const Search& search,
+                       const std::vector<Candidate>& candidates,
+                       const Camera& camera,
+                       int num_probes) {
+  std::vector<BearingPair> pairs;
+  const std::size_t step =
+      std::max<std::size_t>(1, candidates.size() / static_cast<std::size_t>(num_probes));
+  for (std::size_t k = 0; k < candidates.size(); k += step) {
+    const auto expected_px = search.Expect(candidates[k]);
+    if (!expected_px) continue;
+    const auto found_px = search.Probe(candidates[k], *expected_px);
+    if (!found_px) continue;
+    const auto expected = camera.Unproject(*expected_px);
+    const auto found = camera.Unproject(*found_px);
+    if (expected && found) pairs.push_back({*expected, *found});
+  }
+  return AlignMostBearings(pairs).value_or(Rotation());
+}
+
+}  // namespace
+
+std::optional<std::string> TrackingOptions::Problem() const {
+  if (!(min_correlation >= 0.0 && min_correlation < 1.0)) {
+    return OutOfRange("min_correlation", min_correlation, "0 or more and below 1");
+  }
+  if (num_probes < 1) return OutOfRange("num_probes", num_probes, "at least 1");
+  if (num_references < 1) return OutOfRange("num_references", num_references, "at least 1");
+  if (min_points < 0) return OutOfRange("min_points", min_points, "zero or more");
+  if (!(min_found_ratio >= 0.0 && min_found_ratio <= 1.0)) {
+    return OutOfRange("min_found_ratio", min_found_ratio, "0 to 1");
+  }
+  return std::nullopt;
+}
+
+bool TrackingResult::IsPoor(const TrackingOptions& options) const {
+  const int found = static_cast<int>(points.size());
+  return found < options.min_points || found < options.min_found_ratio * num_sought;
+}
+
+std::optional<Rotation> AlignMostBearings(const std::vector<BearingPair>& pairs) {
+  constexpr std::size_t kFewest = 10;
+  constexpr int kRounds = 5;
+  std::vector<BearingPair> kept = pairs;
+  std::optional<Rotation> j_from_i;
+  for (int round = 0; round < kRounds && kept.size() >= kFewest; ++round) {
+    const auto aligned = AlignBearings(kept);
+    if (!aligned) break;
+    j_from_i = aligned;
+    std::vector<double> errors;
+    errors.reserve(pairs.size());
+    for (const BearingPair& pair : pairs) {
+      errors.push_back((*aligned * pair.bearing_i - pair.bearing_j).norm());
+    }
+    std::vector<double> sorted = errors;
+    const auto middle = sorted.begin() + static_cast<std::ptrdiff_t>(sorted.size() / 2);
+    std::nth_element(sorted.begin(), middle, sorted.end());
+    kept.clear();
+    for (std::size_t k = 0; k < pairs.size(); ++k) {
+      if (errors[k] <= 1.5 * *middle) kept.push_back(pairs[k]);
+    }
+  }
+  return j_from_i;
+}
+
+Eigen::Matrix2d PatchWarp(const Camera& camera,
+                          const Eigen::Vector3d& bearing,
+                          const Rotation& target_from_view) {
+  Eigen::Matrix<double, 2, 3> J_view;
+  Eigen::Matrix<double, 2, 3> J_target;
+  if (!camera.Project(bearing, &J_view) || !camera.Project(target_from_view * bearing, &J_target)) {
+    return Eigen::Matrix2d::Identity();
+  }
+  const Eigen::Matrix<double, 3, 2> bearing_from_view =
+      J_view.transpose() * (J_view * J_view.transpose()).inverse();
+  return J_target * target_from_view.Matrix() * bearing_from_view;
+}
+
+TrackingResult TrackPoints(std::span<const OrientedView> views,
+                           const TrackingTarget& target,
+                           const Camera& camera,
+                           const TrackingOptions& options,
+                           int num_threads) {
+  if (const auto problem = options.Problem()) {
+    throw std::invalid_argument("TrackingOptions: " + *problem);
+  }
+  TrackingResult result;
+  result.cam_from_world = target.cam_from_world;
+  const std::vector<Candidate> candidates = FindCandidates(views, target.max_points);
+  Search search(views, target, camera, options);
+  result.cam_from_world =
+      ProbeRotation(search, candidates, camera, options.num_probes) * target.cam_from_world;
+  search.SetOrientation(result.cam_from_world);
+
+  constexpr int kChunk = 64;
+  const int num_candidates = static_cast<int>(candidates.size());
+  std::vector<std::optional<Location>> found(candidates.size());
+  std::vector<char> is_sought(candidates.size(), 0);
+  ParallelFor((num_candidates + kChunk - 1) / kChunk, num_threads, [&](int chunk) {
+    const int end = std::min((chunk + 1) * kChunk, num_candidates);
+    for (int k = chunk * kChunk; k < end; ++k) {
+      const auto expected_px = search.Expect(candidates[k]);
+      if (!expected_px) continue;
+      is_sought[k] = 1;
+      found[k] = search.Locate(candidates[k], *expected_px);
+    }
+  });
+  for (int k = 0; k < num_candidates; ++k) {
+    result.num_sought += is_sought[k];
+    if (!found[k]) continue;
+    const Candidate& candidate = candidates[k];
+    result.points.push_back(
+        {candidate.track, candidate.view, candidate.index, found[k]->px, found[k]->covariance_px});
+  }
+  return result;
+}
+
+}  // namespace rotslam
