@@ -14,3 +14,18 @@ run(${CMAKE_COMMAND} -S ${consumer_dir} -B ${work_dir}/build -G ${generator}
 run(${CMAKE_COMMAND} --build ${work_dir}/build)
 run(${work_dir}/build/consumer ${work_dir}/trajectory.txt)
 run(${work_dir}/prefix/bin/rotslam eval --json ${work_dir}/trajectory.txt ${work_dir}/trajectory.txt)
+
+# The streaming example, on a few rendered images: eight numbers for each.
+run(${CMAKE_COMMAND} -S ${example_dir} -B ${work_dir}/streaming -G ${generator}
+  -D CMAKE_PREFIX_PATH=${work_dir}/prefix -D CMAKE_CXX_COMPILER=${compiler} -D CMAKE_CXX_FLAGS=${flags})
+run(${CMAKE_COMMAND} --build ${work_dir}/streaming)
+run(${work_dir}/prefix/bin/rotslam simulate handheld --frames 6 --width 320 --height 240 --quiet
+  --out ${work_dir}/sequence)
+execute_process(
+  COMMAND ${work_dir}/streaming/streaming ${work_dir}/sequence ${work_dir}/sequence/camera.yaml
+  OUTPUT_VARIABLE lines RESULT_VARIABLE result)
+string(REGEX MATCHALL "\n[0-9.]+ -?[0-9.]+ -?[0-9.]+ -?[0-9.]+ -?[0-9.]+ [0-9.]+ [0-9.]+ [0-9.]+" frames "${lines}")
+list(LENGTH frames num_frames)
+if(NOT result EQUAL 0 OR NOT num_frames EQUAL 6)
+  message(FATAL_ERROR "the streaming example (${result}) printed:\n${lines}")
+endif()
