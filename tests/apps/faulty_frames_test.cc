@@ -96,7 +96,13 @@ TEST_F(FaultyFrames, UnreadableFramesAtBothEnds) {
   const Trajectory trajectory = Result(result);
   ASSERT_EQ(trajectory.size(), std::size_t{kNumFrames});
   // The ends take over the nearest orientation.
-  EXPECT_LT(LargestErrorDeg(trajectory), 3.0);
+  for (const int frame : {0, 1}) {
+    EXPECT_LT(AngleDeg(trajectory[frame].world_from_cam, trajectory[2].world_from_cam), 1e-9);
+  }
+  EXPECT_LT(AngleDeg(trajectory[kNumFrames - 1].world_from_cam,
+                     trajectory[kNumFrames - 2].world_from_cam),
+            1e-9);
+  EXPECT_LT(LargestErrorDeg(Trajectory(trajectory.begin() + 2, trajectory.end() - 1), 2), 0.2);
 }
 
 TEST_F(FaultyFrames, ABlackoutInTheMiddle) {

@@ -116,8 +116,9 @@ class SmallSequenceTest : public testing::Test {
   }
 
   // Largest error of an orientation relative to the first frame's.
-  static double LargestErrorDeg(const Trajectory& trajectory) {
-    const Trajectory truth = ReadTrajectory(Good() / "groundtruth_tum.txt");
+  static double LargestErrorDeg(const Trajectory& trajectory, int first_frame = 0) {
+    const Trajectory whole = ReadTrajectory(Good() / "groundtruth_tum.txt");
+    const Trajectory truth(whole.begin() + first_frame, whole.end());
     double largest = 0.0;
     for (std::size_t k = 0; k < trajectory.size(); ++k) {
       largest =
