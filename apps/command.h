@@ -35,5 +35,6 @@ void AddRunCommand(CLI::App& app, Action& action);
 void AddRotationsCommand(CLI::App& app, Action& action);
 void AddSimulateCommand(CLI::App& app, Action& action);
 void AddEvalCommand(CLI::App& app, Action& action);
+void AddVocabularyCommand(CLI::App& app, Action& action);
 
 }  // namespace rotslam

@@ -57,6 +57,7 @@ int main(int argc, char** argv) {
     rotslam::AddRotationsCommand(app, action);
     rotslam::AddEvalCommand(app, action);
     rotslam::AddSimulateCommand(app, action);
+    rotslam::AddVocabularyCommand(app, action);
     try {
       app.parse(argc, argv);
     } catch (const CLI::Success& help) {

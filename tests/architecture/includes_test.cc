@@ -20,6 +20,7 @@ const std::map<Folder, std::set<Folder>> kAllowed = {
     {"rotodom/sequence", {"rotodom/types", "rotodom/camera"}},
     {"rotodom/features", {"rotodom/types", "rotodom/camera"}},
     {"rotodom/matching", {"rotodom/types", "rotodom/camera", "rotodom/features"}},
+    {"rotodom/loop", {"rotodom/types"}},
     {"rotodom/relative_rotation", {"rotodom/types"}},
     {"rotodom/averaging", {"rotodom/types"}},
     {"rotodom/tracks", {"rotodom/types", "rotodom/features"}},

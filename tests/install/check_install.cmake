@@ -14,6 +14,8 @@ run(${CMAKE_COMMAND} -S ${consumer_dir} -B ${work_dir}/build -G ${generator}
 run(${CMAKE_COMMAND} --build ${work_dir}/build)
 run(${work_dir}/build/consumer ${work_dir}/trajectory.txt)
 run(${work_dir}/prefix/bin/rotslam eval --json ${work_dir}/trajectory.txt ${work_dir}/trajectory.txt)
+# The vocabulary is in the program, wherever it lies.
+run(${work_dir}/prefix/bin/rotslam vocabulary info)
 
 # The streaming example, on a few rendered images: eight numbers for each.
 run(${CMAKE_COMMAND} -S ${example_dir} -B ${work_dir}/streaming -G ${generator}
