@@ -28,7 +28,7 @@ constexpr double kLargestEvidence_rad = 0.25;
 // Trees at random that are tried in a row without confirming anything, by size of the graph.
 constexpr int kMaxVainTrees = 60;
 constexpr int kMinVainTrees = 2;
-constexpr double kVainTreeEdges = 2e6;
+constexpr double kVainTreeEdges = 5e5;
 // Edges between two pieces: compared in pairs up to this number; the share that must agree.
 constexpr int kMaxVotes = 64;
 constexpr int kVotesPerAgreement = 4;
@@ -117,7 +117,7 @@ class Consensus {
   int CommonAncestor(int a, int b) const;
   double PathVariance(int a, int b) const;
   double SquaredResidual(int edge) const;
-  bool Agrees(int edge) const;
+  bool Agrees(int edge, bool needs_evidence) const;
   bool ConfirmCycles();
   bool ConfirmByVotes();
   bool ConfirmVotes(std::vector<int>& edges);
@@ -388,9 +388,11 @@ double Consensus::SquaredResidual(int edge) const {
                       e.j_from_i.conjugate());
 }
 
-bool Consensus::Agrees(int edge) const {
+bool Consensus::Agrees(int edge, bool needs_evidence) const {
   const ConsensusEdge& e = problem_.edges[edge];
-  return SquaredResidual(edge) <= Tolerance(e.variance + PathVariance(e.i, e.j));
+  const double tolerance = Tolerance(e.variance + PathVariance(e.i, e.j));
+  if (needs_evidence && !IsConfirmed(edge) && !IsEvidence(tolerance)) return false;
+  return SquaredResidual(edge) <= tolerance;
 }
 
 // Edges outside the tree that agree with it confirm their cycles.
@@ -517,7 +519,14 @@ ConsensusStart Consensus::Find() {
   BuildTree(0);
   ConsensusStart start;
   start.is_trusted.resize(problem_.edges.size());
-  for (int edge = 0; edge < num_edges_; ++edge) start.is_trusted[edge] = Agrees(edge) ? 1 : 0;
+  // Where cycles are short enough to tell right from wrong, long ones that prove nothing are not
+  // believed.
+  const auto confirmed = std::count(verdict_.begin(), verdict_.end(), Verdict::kConfirmed);
+  const bool cycles_tell = 2 * confirmed > num_edges_;
+  for (int edge = 0; edge < num_edges_; ++edge) {
+    start.is_trusted[edge] = Agrees(edge, cycles_tell) ? 1 : 0;
+  }
+  start.roots = Roots();
   start.cam_from_world = std::move(cam_from_world_);
   start.component = std::move(component_);
   return start;

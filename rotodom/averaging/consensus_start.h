@@ -32,6 +32,8 @@ struct ConsensusProblem {
 struct ConsensusStart {
   std::vector<Eigen::Quaterniond> cam_from_world;
   std::vector<int> component;  // by view, numbered by their first views
+  // Where the tree begins, one view or the held ones per component; its best confirmed views.
+  std::vector<int> roots;
   // By edge: whether it agrees with the start, drift along the tree between its ends considered.
   std::vector<char> is_trusted;
 };

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <functional>
 #include <limits>
 
 #include <Eigen/Cholesky>
@@ -25,7 +26,7 @@ constexpr double kContradiction = 0.25;
 constexpr double kDamping = 1e-9;
 // Edges of smaller weights are left out of factorisations: wrong ones join distant views and would
 // fill them.
-constexpr double kStructuralWeight = 0.01;
+constexpr double kStructuralWeight = 0.1;
 constexpr int kTermsPerChunk = 4096;
 
 // Rotation vector of a quaternion near the identity without trigonometry, exact to 1e-10.
@@ -149,25 +150,28 @@ double EdgeSystem::Step(EdgeLoss loss) {
   return last_turn_;
 }
 
-bool EdgeSystem::HasDoubtfulView() const {
+int EdgeSystem::CountDoubtfulViews() const {
   std::vector<int> balance(num_free_, 0);
   for (const Term& term : terms_) {
     const int vote = term.weight < kContradiction ? -1 : 1;
     if (term.i < num_free_) balance[term.i] += vote;
     if (term.j < num_free_) balance[term.j] += vote;
   }
-  return std::any_of(balance.begin(), balance.end(), [](int votes) { return votes < 0; });
+  return static_cast<int>(
+      std::count_if(balance.begin(), balance.end(), [](int votes) { return votes < 0; }));
 }
 
-double EdgeSystem::LargestAgreedTurn() const {
-  double largest = 0.0;
+double EdgeSystem::AgreedTurn(double exceeding_share) const {
+  std::vector<double> squared(static_cast<std::size_t>(num_free_) + 1, 0.0);
   for (const Term& term : terms_) {
     if (term.weight < kContradiction) continue;
     for (const int view : {term.i, term.j}) {
-      if (view < num_free_) largest = std::max(largest, step_.segment<3>(3 * view).squaredNorm());
+      if (view < num_free_) squared[view] = step_.segment<3>(3 * view).squaredNorm();
     }
   }
-  return std::sqrt(largest);
+  const auto rank = static_cast<std::ptrdiff_t>(exceeding_share * num_free_);
+  std::nth_element(squared.begin(), squared.begin() + rank, squared.end(), std::greater<>());
+  return std::sqrt(squared[rank]);
 }
 
 Rotation EdgeSystem::CamFromWorld(int view) const {

@@ -62,13 +62,13 @@ class EdgeSystem {
     terms_[edge].squared_scale = loss_sigmas * loss_sigmas;
   }
 
-  /// Some free view's edges mostly contradict the present orientations: they lie beyond the loss'
+  /// Free views whose edges mostly contradict the present orientations: they lie beyond the loss'
   /// scale. The last step must have been, or be preceded by, `Linearize`.
-  bool HasDoubtfulView() const;
+  int CountDoubtfulViews() const;
 
-  /// Largest turn in the last step of a view with an edge that agrees. The others have nothing to
-  /// hold them and may wander for long.
-  double LargestAgreedTurn() const;
+  /// The turn in the last step that no more than this share of the free views exceeded, of those
+  /// with an edge that agrees. Views whose other edges are wrong may wander for long.
+  double AgreedTurn(double exceeding_share) const;
 
   /// Residuals and weights at the present orientations.
   void Linearize(EdgeLoss loss = EdgeLoss::kGemanMcClure);

@@ -15,8 +15,13 @@ namespace {
 
 // The L1 stage is a start: it need not be finished.
 constexpr double kL1Step_rad = 1e-3;
-// A trusted edge begins with a loss of this many times its residual.
-constexpr double kFirstLoss = 2.0;
+// Share of the views that may still turn at the end: some hang on wrong edges alone.
+constexpr double kWanderers = 0.005;
+// Share of the views that the start must contradict before all are moved by the L1 cost.
+constexpr double kDoubtful = 0.05;
+// A trusted edge begins with a loss of this many times its residual: that is nearly quadratic,
+// where twice the residual would make steps twice as long as the cost allows.
+constexpr double kFirstLoss = 10.0;
 // Errors that last make the variances of orientations some 30 times too small over 160 frames
 // (AveragingOptions::lasting_share).
 constexpr double kOdometryDrift = 5.5;
@@ -92,7 +97,7 @@ ConsensusStart FindStart(const GlobalAveragingProblem& problem,
   ConsensusProblem consensus;
   consensus.num_views = views.size();
   consensus.edges = edges;
-  consensus.has_start = true;
+  consensus.has_start = problem.use_start;
   consensus.trust_sigmas = options.trust_sigmas;
   consensus.drift_factor = options.drift_factor;
   consensus.cam_from_world.resize(views.ids.size(), Eigen::Quaterniond::Identity());
@@ -109,45 +114,18 @@ ConsensusStart FindStart(const GlobalAveragingProblem& problem,
   return FindConsensusStart(consensus, num_threads);
 }
 
-// By component, its held views or else its first one.
-std::vector<char> MarkHeld(const GlobalAveragingProblem& problem,
-                           const Views& views,
-                           const ConsensusStart& start) {
-  std::vector<char> is_held(views.ids.size(), 0);
-  std::vector<char> has_held(views.ids.size(), 0);
-  for (const FrameId view : problem.held_views) {
-    const int position = views.PositionOf(view);
-    is_held[position] = 1;
-    has_held[start.component[position]] = 1;
-  }
-  for (int k = 0; k < views.size(); ++k) {
-    char& has_one = has_held[start.component[k]];
-    if (has_one == 0) is_held[k] = has_one = 1;
-  }
-  return is_held;
-}
-
 // Components without a held view begin at the orientation given for their first view, or at the
-// identity.
-void FixGauge(const GlobalAveragingProblem& problem, const Views& views, ConsensusStart& start) {
-  std::vector<Eigen::Quaterniond> world_from_goal;
-  std::vector<char> is_free(views.ids.size(), 1);
-  for (const FrameId view : problem.held_views) {
-    is_free[start.component[views.PositionOf(view)]] = 0;
-  }
-  for (int k = 0; k < views.size(); ++k) {
-    const int component = start.component[k];
-    Eigen::Quaterniond& cam_from_world = start.cam_from_world[k];
+// identity. The solver held another one: a first view may hang on a few doubtful edges.
+void FixGauge(const GlobalAveragingProblem& problem, GlobalAveragingResult& result) {
+  std::vector<char> is_free(result.component_sizes.size(), 1);
+  for (const FrameId view : problem.held_views) is_free[result.component.at(view)] = 0;
+  std::vector<Rotation> world_from_goal;
+  for (auto& [view, cam_from_world] : result.cam_from_world) {
+    const int component = result.component.at(view);
     if (component == static_cast<int>(world_from_goal.size())) {
-      const auto given = problem.cam_from_world.find(views.ids[k]);
-      const Eigen::Quaterniond goal = given == problem.cam_from_world.end()
-                                          ? Eigen::Quaterniond::Identity()
-                                          : given->second.Quaternion();
-      world_from_goal.push_back(cam_from_world.conjugate() * goal);
-      if (is_free[component] != 0) {
-        cam_from_world = goal;
-        continue;
-      }
+      const auto given = problem.cam_from_world.find(view);
+      const Rotation goal = given == problem.cam_from_world.end() ? Rotation() : given->second;
+      world_from_goal.push_back(cam_from_world.Inverse() * goal);
     }
     if (is_free[component] != 0) cam_from_world = cam_from_world * world_from_goal[component];
   }
@@ -162,9 +140,10 @@ struct Assembly {
 Assembly Assemble(const GlobalAveragingProblem& problem,
                   const std::vector<ConsensusEdge>& edges,
                   const ConsensusStart& start,
-                  const std::vector<char>& is_held,
                   const GlobalAveragingOptions& options,
                   int num_threads) {
+  std::vector<char> is_held(start.component.size(), 0);
+  for (const int root : start.roots) is_held[root] = 1;
   std::vector<int> slot(is_held.size());
   std::vector<Eigen::Quaterniond> orientations;
   orientations.reserve(is_held.size());
@@ -203,7 +182,7 @@ void Minimize(EdgeSystem& system,
     system.SetLossSigmas(static_cast<int>(k), loss[k]);
   }
   system.Linearize();
-  if (system.HasDoubtfulView()) {
+  if (system.CountDoubtfulViews() > kDoubtful * system.num_free()) {
     for (int iteration = 0; iteration < options.l1_iterations; ++iteration) {
       ++result.iterations;
       if (system.Step(EdgeLoss::kL1) < kL1Step_rad) break;
@@ -220,7 +199,7 @@ void Minimize(EdgeSystem& system,
       has_shrunk = true;
     }
     result.has_converged =
-        !has_shrunk && system.LargestAgreedTurn() < options.min_step_deg * kRadFromDeg;
+        !has_shrunk && system.AgreedTurn(kWanderers) < options.min_step_deg * kRadFromDeg;
     if (result.has_converged) return;
   }
 }
@@ -268,10 +247,8 @@ GlobalAveragingResult AverageGlobally(const GlobalAveragingProblem& problem,
   CheckProblem(problem);
   const Views views = ViewsOf(problem);
   const std::vector<ConsensusEdge> edges = ConsensusEdges(problem, views, options);
-  ConsensusStart start = FindStart(problem, views, edges, options, num_threads);
-  FixGauge(problem, views, start);
-  const std::vector<char> is_held = MarkHeld(problem, views, start);
-  Assembly assembly = Assemble(problem, edges, start, is_held, options, num_threads);
+  const ConsensusStart start = FindStart(problem, views, edges, options, num_threads);
+  Assembly assembly = Assemble(problem, edges, start, options, num_threads);
 
   GlobalAveragingResult result;
   assembly.system.Linearize();
@@ -288,6 +265,7 @@ GlobalAveragingResult AverageGlobally(const GlobalAveragingProblem& problem,
     result.cam_from_world.emplace_hint(
         result.cam_from_world.end(), views.ids[k], assembly.system.CamFromWorld(assembly.slot[k]));
   }
+  FixGauge(problem, result);
   return result;
 }
 

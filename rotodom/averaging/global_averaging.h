@@ -29,10 +29,12 @@ struct GlobalAveragingOptions {
   double drift_factor = 1.0;
   // Trusted edges that disagree with the start, as loops do with drift, begin with a loss that lets
   // them pull, which shrinks by this factor at every iteration down to loss_sigmas.
-  double loss_decay = 0.5;
-  // Steps of the convex L1 cost before that, where the start contradicts most edges of some view.
+  double loss_decay = 0.3;
+  // Steps of the convex L1 cost before that, where the start contradicts most edges of one view
+  // in 20.
   int l1_iterations = 5;
-  // Stop when no orientation moves by more than this, and after max_iterations in any case.
+  // Stop when no orientation but those of one view in 200 moves by more than this, and after
+  // max_iterations in any case.
   double min_step_deg = 1e-4;
   int max_iterations = 100;
 
@@ -55,8 +57,10 @@ struct GlobalAveragingOptions {
 struct GlobalAveragingProblem {
   // In any order and direction, several of one pair allowed.
   std::span<const RelativeRotation> edges;
-  // Orientations of held views; a start for the others when it names every view of the edges.
+  // Orientations of held views; with `use_start` a start for the others, too, when it names every
+  // view of the edges.
   RotationMap cam_from_world;
+  bool use_start = true;
   // Views that keep their orientation, several in a component allowed.
   std::set<FrameId> held_views;
 };
@@ -82,7 +86,7 @@ struct GlobalAveragingResult {
 /// least squares in the tangent space with edges weighted by their covariances.
 /// @return  orientations of all views that edges or held_views name. A component without a held
 /// view
-///          has its first view where the start has it, else at the identity.
+///          has its first view where `cam_from_world` has it, else at the identity.
 /// Throws std::invalid_argument when an option is out of range, a held view has no orientation, an
 /// edge joins a view with itself or its covariance is not positive definite.
 /// Error:   the robust cost's minimum nearest to the start, to min_step_deg.

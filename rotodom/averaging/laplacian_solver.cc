@@ -10,7 +10,7 @@
 namespace rotslam {
 namespace {
 
-constexpr double kTolerance = 1e-7;
+constexpr double kTolerance = 1e-4;
 constexpr int kMaxIterations = 300;
 // A factorisation is made anew when the old one took more iterations than this: one costs about as
 // much as so many products on graphs of streets.

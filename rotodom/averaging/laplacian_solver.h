@@ -35,7 +35,7 @@ class LaplacianSolver {
   /// Replaces `x`, 3 num_free numbers, by the solution for it as right side.
   /// @param damping  share of the largest pivot added to all.
   /// @return  false when there is no finite solution.
-  /// Error:   relative residual 1e-7, in the norm of the preconditioner.
+  /// Error:   relative residual 1e-4, in the norm of the preconditioner.
   /// Cost:    a factorisation now and then, and one to some twenty products with the matrix.
   bool Solve(std::span<const LaplacianEdge> edges, double damping, Eigen::VectorXd& x);
 
