@@ -522,7 +522,7 @@ ConsensusStart Consensus::Find() {
   // Where cycles are short enough to tell right from wrong, long ones that prove nothing are not
   // believed.
   const auto confirmed = std::count(verdict_.begin(), verdict_.end(), Verdict::kConfirmed);
-  const bool cycles_tell = 2 * confirmed > num_edges_;
+  const bool cycles_tell = !problem_.has_start && 2 * confirmed > num_edges_;
   for (int edge = 0; edge < num_edges_; ++edge) {
     start.is_trusted[edge] = Agrees(edge, cycles_tell) ? 1 : 0;
   }

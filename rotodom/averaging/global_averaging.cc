@@ -175,6 +175,8 @@ void Minimize(EdgeSystem& system,
               const std::vector<char>& is_trusted,
               const GlobalAveragingOptions& options,
               GlobalAveragingResult& result) {
+  result.has_converged = system.num_free() == 0;
+  if (result.has_converged) return;
   std::vector<double> loss(is_trusted.size(), options.loss_sigmas);
   for (std::size_t k = 0; k < loss.size(); ++k) {
     if (is_trusted[k] == 0) continue;
