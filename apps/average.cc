@@ -98,6 +98,7 @@ void PrintCertificate(const RotationList& list,
 int Average(const AverageFlags& flags) {
   GlobalAveragingOptions options;
   if (!flags.common.config.empty()) LoadOptionsYaml(flags.common.config, options);
+  options.seed = flags.common.seed;
   const auto start = std::chrono::steady_clock::now();
   const RotationList list = ReadRotationList(flags.graph, flags.sigma_deg * kRadFromDeg);
   const double read_s = SecondsSince(start);

@@ -28,7 +28,7 @@ constexpr double kLargestEvidence_rad = 0.25;
 // Trees at random that are tried in a row without confirming anything, by size of the graph.
 constexpr int kMaxVainTrees = 60;
 constexpr int kMinVainTrees = 2;
-constexpr double kVainTreeEdges = 5e5;
+constexpr double kVainTreeEdges = 2.5e5;
 // Edges between two pieces: compared in pairs up to this number; the share that must agree.
 constexpr int kMaxVotes = 64;
 constexpr int kVotesPerAgreement = 4;
@@ -41,8 +41,8 @@ bool IsEvidence(double squared_tolerance) {
 }
 
 // A number from 0 to 1 that looks random.
-double Hash(std::uint64_t round, std::uint64_t edge) {
-  std::uint64_t z = (round << 40) + edge + 0x9e3779b97f4a7c15U;
+double Hash(std::uint64_t seed, std::uint64_t trial, std::uint64_t edge) {
+  std::uint64_t z = ((seed * 0x2545f4914f6cdd1dU + trial) << 32) + edge + 0x9e3779b97f4a7c15U;
   z = (z ^ (z >> 30)) * 0xbf58476d1ce4e5b9U;
   z = (z ^ (z >> 27)) * 0x94d049bb133111ebU;
   return static_cast<double>((z ^ (z >> 31)) >> 11) * 0x1p-53;
@@ -351,7 +351,7 @@ void Consensus::BuildTree(int trial) {
       double extra = 0.0;
       if (verdict != Verdict::kConfirmed) {
         extra = verdict == Verdict::kUnknown ? kUnconfirmedClass : kContradictedClass;
-        if (trial > 0) extra *= 0.5 + Hash(trial, n.edge);
+        if (trial > 0) extra *= 0.5 + Hash(problem_.seed, trial, n.edge);
       }
       queue.emplace(path_class + extra, variance + problem_.edges[n.edge].variance, n.view, n.edge);
     }

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <cstdint>
 #include <span>
 #include <vector>
 
@@ -27,6 +28,7 @@ struct ConsensusProblem {
   double trust_sigmas = 4.0;
   // Errors along paths are this many times what independent errors of their edges add up to.
   double drift_factor = 1.0;
+  std::uint64_t seed = 1;  // of the trees tried at random
 };
 
 struct ConsensusStart {

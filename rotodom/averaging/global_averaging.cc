@@ -18,7 +18,7 @@ constexpr double kL1Step_rad = 1e-3;
 // Share of the views that may still turn at the end: some hang on wrong edges alone.
 constexpr double kWanderers = 0.005;
 // Share of the views that the start must contradict before all are moved by the L1 cost.
-constexpr double kDoubtful = 0.05;
+constexpr double kDoubtful = 0.25;
 // A trusted edge begins with a loss of this many times its residual: that is nearly quadratic,
 // where twice the residual would make steps twice as long as the cost allows.
 constexpr double kFirstLoss = 10.0;
@@ -100,6 +100,7 @@ ConsensusStart FindStart(const GlobalAveragingProblem& problem,
   consensus.has_start = problem.use_start;
   consensus.trust_sigmas = options.trust_sigmas;
   consensus.drift_factor = options.drift_factor;
+  consensus.seed = options.seed;
   consensus.cam_from_world.resize(views.ids.size(), Eigen::Quaterniond::Identity());
   consensus.is_held.resize(views.ids.size(), 0);
   for (int k = 0; k < views.size(); ++k) {

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <cstdint>
 #include <map>
 #include <optional>
 #include <set>
@@ -35,8 +36,10 @@ struct GlobalAveragingOptions {
   int l1_iterations = 5;
   // Stop when no orientation but those of one view in 200 moves by more than this, and after
   // max_iterations in any case.
-  double min_step_deg = 1e-4;
+  double min_step_deg = 1e-3;
   int max_iterations = 100;
+  // Of the trees that are tried at random where cycles leave edges unconfirmed.
+  std::uint64_t seed = 1;
 
   std::optional<std::string> Problem() const;
 
@@ -51,6 +54,7 @@ struct GlobalAveragingOptions {
     visit("l1_iterations", l1_iterations);
     visit("min_step_deg", min_step_deg);
     visit("max_iterations", max_iterations);
+    visit("seed", seed);
   }
 };
 
