@@ -32,7 +32,7 @@ struct RotationList {
 /// and those that start with '#' too.
 /// @param sigma_rad  standard deviation per axis of edges whose lines say none.
 /// Throws std::runtime_error with file, line and reason.
-/// Cost:    about 2 s for a million edges of a g2o file.
+/// Cost:    about 3 s for a million edges of a g2o file.
 RotationList ReadRotationList(const std::filesystem::path& path, double sigma_rad);
 
 /// Writes a pose graph like WriteG2o, with the file's own ids and all of its edges, or, when the

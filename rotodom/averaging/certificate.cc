@@ -15,7 +15,7 @@ constexpr int kMaxNewtonSteps = 100;
 constexpr double kSmallestTurn_rad = 1e-12;
 constexpr double kDamping = 1e-12;
 // Relative to the largest diagonal: what rounding hides, and where the search for epsilon ends.
-constexpr double kFirstShift = 1e-10;
+constexpr double kFirstShift = 1e-12;
 constexpr double kLastShift = 10.0;
 
 struct Chord {
