@@ -34,6 +34,7 @@ void AddCommonFlags(CLI::App& command, CommonFlags& flags);
 void AddRunCommand(CLI::App& app, Action& action);
 void AddRotationsCommand(CLI::App& app, Action& action);
 void AddSimulateCommand(CLI::App& app, Action& action);
+void AddAverageCommand(CLI::App& app, Action& action);
 void AddEvalCommand(CLI::App& app, Action& action);
 void AddVocabularyCommand(CLI::App& app, Action& action);
 

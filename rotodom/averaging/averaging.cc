@@ -161,7 +161,7 @@ RotationMap AverageRotations(const ViewGraph& graph,
   EdgeSystem system = MakeSystem(edges, free, held, cam_from_world, options);
   if (system.terms().empty()) return averaged;
   system.Linearize();
-  if (system.HasDoubtfulView()) {
+  if (system.CountDoubtfulViews() > 0) {
     for (int iteration = 0; iteration < options.l1_iterations; ++iteration) {
       if (system.Step(EdgeLoss::kL1) < kL1Step) break;
     }

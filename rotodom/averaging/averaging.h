@@ -95,7 +95,7 @@ std::set<FrameId> ViewsToAverage(const RotationMap& cam_from_world,
 ///                        held.
 /// @return  the new orientations of `free_views`, and nothing else: the caller's map may be long.
 /// Error:   the cost's minimum nearest to the start, to min_step_deg.
-/// Cost:    one Cholesky factorisation of 3 |free_views| unknowns per iteration; 10 free views with
+/// Cost:    one solution for 3 |free_views| unknowns per iteration (EdgeSystem); 10 free views with
 ///          50 edges take about 0.02 ms in all (tests/bench/averaging_bench.cc).
 /// Source:  Chatterjee & Govindu, Robust Relative Rotation Averaging, PAMI 2018; Chng et al.,
 ///          Monocular Rotational Odometry with Incremental Rotation Averaging and Loop Closure,

@@ -7,6 +7,7 @@
 #include <Eigen/Core>
 #include <Eigen/Geometry>
 
+#include "rotodom/averaging/laplacian_solver.h"
 #include "rotodom/types/view_graph.h"
 
 namespace rotslam {
@@ -21,7 +22,8 @@ enum class EdgeLoss {
 /// The unknowns are small turns of the cameras written in the world's frame,
 /// cam_from_world * Exp(turn). There an edge's residual is r + turn_j - turn_i, so that the normal
 /// equations are the weighted Laplacian of the graph: a step costs a few additions an edge and one
-/// Cholesky factorisation, dense for few unknown orientations and sparse for many.
+/// solution of it, by dense Cholesky factorisation for few unknown orientations and by
+/// LaplacianSolver for many.
 class EdgeSystem {
  public:
   /// An edge between two positions in the list of orientations, in the world's frame.
@@ -32,15 +34,18 @@ class EdgeSystem {
     Eigen::Matrix3d information_in_j;  // inverse covariance in the frame of camera j
     Eigen::Matrix3d information;       // the same in the world's frame
     Eigen::Vector3d residual;          // Log(predicted * measured^-1), in the world's frame
+    double squared_scale = 1.0;        // of the robust loss
     double weight = 1.0;               // of the robust loss
     Eigen::Matrix3d curvature;         // of the loss, what the edge adds to the normal equations
   };
 
   /// @param cam_from_world  orientations; the first `num_free` are unknown, the others held.
   /// @param loss_sigmas     scale of the Geman-McClure loss, in standard deviations.
-  EdgeSystem(std::vector<Eigen::Quaterniond> cam_from_world, int num_free, double loss_sigmas);
-  EdgeSystem(EdgeSystem&&) noexcept;
-  ~EdgeSystem();
+  /// @param num_threads     for systems that are worth it; the answer does not depend on it.
+  EdgeSystem(std::vector<Eigen::Quaterniond> cam_from_world,
+             int num_free,
+             double loss_sigmas,
+             int num_threads = 1);
 
   void Reserve(std::size_t num_edges) { terms_.reserve(num_edges); }
   /// Adds an edge between positions i and j, at least one of them free; `covariance` of the error
@@ -51,9 +56,19 @@ class EdgeSystem {
   /// a negative number when the equations have no finite solution (the orientations then stay).
   double Step(EdgeLoss loss = EdgeLoss::kGemanMcClure);
 
-  /// Some free view's edges mostly contradict the present orientations: they lie beyond the loss'
+  /// Another scale of the loss for one edge, in the order in which they came: larger ones let wrong
+  /// starts pull themselves right.
+  void SetLossSigmas(int edge, double loss_sigmas) {
+    terms_[edge].squared_scale = loss_sigmas * loss_sigmas;
+  }
+
+  /// Free views whose edges mostly contradict the present orientations: they lie beyond the loss'
   /// scale. The last step must have been, or be preceded by, `Linearize`.
-  bool HasDoubtfulView() const;
+  int CountDoubtfulViews() const;
+
+  /// The turn in the last step that no more than this share of the free views exceeded, of those
+  /// with an edge that agrees. Views whose other edges are wrong may wander for long.
+  double AgreedTurn(double exceeding_share) const;
 
   /// Residuals and weights at the present orientations.
   void Linearize(EdgeLoss loss = EdgeLoss::kGemanMcClure);
@@ -66,21 +81,25 @@ class EdgeSystem {
   Eigen::MatrixXd DenseNormalMatrix() const;
 
  private:
-  struct Sparse;
-
+  void LinearizeTerm(Term& term) const;
+  void LinearizeTerms();
+  // Returns information times residual.
+  Eigen::Vector3d ReweightTerm(Term& term, EdgeLoss loss) const;
   void Reweight(EdgeLoss loss);
   bool SolveDense();
   bool SolveSparse();
 
   int num_free_;
   double squared_scale_;
+  int num_threads_;
   std::vector<Eigen::Quaterniond> cam_from_world_;
   std::vector<Eigen::Matrix3d> R_c_w_;
   std::vector<Term> terms_;
   Eigen::VectorXd turns_;  // since the last Linearize
   Eigen::VectorXd step_;   // gradient, then solution
   Eigen::MatrixXd dense_;
-  std::unique_ptr<Sparse> sparse_;
+  std::unique_ptr<LaplacianSolver> solver_;
+  std::vector<LaplacianEdge> laplacian_;
   double last_turn_;
 };
 

@@ -1,0 +1,45 @@
+#pragma once
+
+#include <cstdint>
+#include <filesystem>
+#include <vector>
+
+#include "rotodom/types/maps.h"
+#include "rotodom/types/view_graph.h"
+
+namespace rotslam {
+
+/// Relative rotations from somebody else's file, their views numbered anew.
+struct RotationList {
+  // The file's numbers, ascending; FrameId k stands for ids[k].
+  std::vector<std::uint64_t> ids;
+  std::vector<RelativeRotation> edges;  // as in the file, in its order and directions
+  RotationMap cam_from_world;           // of vertices, where the file has them
+  CenterMap center_in_world;
+  std::vector<FrameId> fixed;
+  bool is_pose_graph = false;  // g2o rather than a plain list
+};
+
+/// Reads rotations to average, g2o, TORO or a plain list, told apart by their lines:
+/// - `VERTEX_SE3:QUAT id x y z qx qy qz qw`, `EDGE_SE3:QUAT i j x y z qx qy qz qw` and the upper
+///   triangle of the information, `FIX id ...`, as ReadG2o takes them;
+/// - `VERTEX3 id x y z roll pitch yaw`, `EDGE3 i j x y z roll pitch yaw` and the upper triangle of
+///   the information of (x, y, z, roll, pitch, yaw), R = Rz(yaw) Ry(pitch) Rx(roll), of which the
+///   rotation's block is used; isotropic when it is missing;
+/// - `i j qx qy qz qw`, and `i j` with the nine numbers of a rotation matrix by rows, more numbers
+///   being ignored: j_from_i, x_j = R x_i.
+/// Ids are whole numbers up to 2^64 - 1. Lines with other words in front are skipped, empty lines
+/// and those that start with '#' too.
+/// @param sigma_rad  standard deviation per axis of edges whose lines say none.
+/// Throws std::runtime_error with file, line and reason.
+/// Cost:    about 3 s for a million edges of a g2o file.
+RotationList ReadRotationList(const std::filesystem::path& path, double sigma_rad);
+
+/// Writes a pose graph like WriteG2o, with the file's own ids and all of its edges, or, when the
+/// name ends in anything but ".g2o", a line `id qx qy qz qw` (cam_from_world) per view.
+/// Throws std::runtime_error when the file cannot be written.
+void WriteRotationList(const std::filesystem::path& path,
+                       const RotationList& list,
+                       const RotationMap& cam_from_world);
+
+}  // namespace rotslam

@@ -1,0 +1,45 @@
+#pragma once
+
+#include <span>
+#include <vector>
+
+#include "rotodom/types/maps.h"
+#include "rotodom/types/view_graph.h"
+
+namespace rotslam {
+
+/// What is certified: the chordal least-squares cost, the sum over the edges of
+/// weight |R_j - R_j_i R_i|^2 (Frobenius), weights fixed and isotropic. It is not the robust cost
+/// that AverageGlobally minimises; on its inliers the two have their minima close together.
+struct AveragingCertificate {
+  RotationMap cam_from_world;  // refined to a stationary point of this cost
+  double cost = 0.0;
+  // No orientations have a lower cost than `cost_bound`.
+  double cost_bound = 0.0;
+  // The smallest eigenvalue of the dual matrix is at least this; zero or little below it where the
+  // orientations are optimal.
+  double smallest_eigenvalue = 0.0;
+  double gradient = 0.0;  // of the cost, largest of a view, relative to the view's weights
+  double RelativeGap() const { return cost > 0.0 ? (cost - cost_bound) / cost : 0.0; }
+};
+
+/// Refines orientations to a minimum of the chordal cost and bounds how far from the global minimum
+/// it can be.
+///
+/// At a stationary point the Lagrange multipliers of R^T R = I follow in closed form; with the
+/// multipliers' blocks Lambda and the connection Laplacian L of the graph, every choice of n
+/// orientations costs at least cost + 3 n min(0, lambda) where lambda is the smallest eigenvalue of
+/// S = L - Lambda. That S + epsilon I is positive definite is shown by its Cholesky factorisation,
+/// and the smallest such epsilon found by bisection to a factor of two.
+/// @param weights  by edge, zero or more; zero leaves an edge out.
+/// Throws std::invalid_argument when the sizes differ, a weight is negative or an edge's view has
+/// no orientation. Error:   eigenvalues to 1e-12 of the largest weight of a view. Cost:    some
+/// twenty Cholesky factorisations of 3 n unknowns. Source:  Eriksson et al., Rotation Averaging and
+/// Strong Duality, CVPR 2018; Rosen, Scalable
+///          Low-Rank Semidefinite Programming for Certifiably Correct Machine Perception, 2022, for
+///          the factorisation as a test.
+AveragingCertificate CertifyAveraging(std::span<const RelativeRotation> edges,
+                                      std::span<const double> weights,
+                                      const RotationMap& cam_from_world);
+
+}  // namespace rotslam
