@@ -106,7 +106,7 @@ Eigen::Vector3d EdgeSystem::ReweightTerm(Term& term, EdgeLoss loss) const {
   Eigen::Vector3d residual = term.residual;
   if (term.j < num_free_) residual += turns_.segment<3>(3 * term.j);
   if (term.i < num_free_) residual -= turns_.segment<3>(3 * term.i);
-  const Eigen::Vector3d pull = term.information * residual;
+  Eigen::Vector3d pull = term.information * residual;
   const double squared = residual.dot(pull);
   if (loss == EdgeLoss::kL1) {
     term.weight = 1.0 / std::sqrt(std::max(squared, kSmallestL1 * kSmallestL1));

@@ -72,7 +72,8 @@ double ShareFound(const RotationMap& estimate, const RotationMap& truth) {
 
 // Views with fewer than two right edges, and pieces that only such edges tie to the rest, cannot be
 // told: on these graphs that leaves 98 % to find among random edges at 40 %, 82 % on the grid at 30
-// % and 99 % on the chain at 40 %.
+// % and 99 % on the chain at 40 %. On the grid at 30 % four of 30 runs over other seeds found less,
+// 45 to 68 %.
 TEST(AverageGlobally, LadderOfWrongEdges) {
   struct Rung {
     GraphShape shape;
@@ -88,6 +89,7 @@ TEST(AverageGlobally, LadderOfWrongEdges) {
                           Rung{GraphShape::kGrid, 0.0, 1.0, 1.0},
                           Rung{GraphShape::kGrid, 0.1, 0.96, 1.0},
                           Rung{GraphShape::kGrid, 0.2, 0.9, 1.3},
+                          Rung{GraphShape::kGrid, 0.3, 0.75, 1.6},
                           Rung{GraphShape::kChain, 0.0, 1.0, 0.8},
                           Rung{GraphShape::kChain, 0.1, 1.0, 0.8},
                           Rung{GraphShape::kChain, 0.2, 1.0, 0.8},
