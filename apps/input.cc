@@ -3,6 +3,7 @@
 #include <stdexcept>
 
 #include "rotodom/camera/read_camera.h"
+#include "rotodom/loop/vocabulary_file.h"
 
 namespace rotslam {
 
@@ -11,6 +12,10 @@ void InputFlags::Override(SequenceOptions& options) const {
   if (last) options.last = *last;
   if (stride) options.stride = *stride;
   if (fps) options.fps = *fps;
+}
+
+void InputFlags::Override(LoopOptions& options) const {
+  if (loops) options.use_loops = *loops;
 }
 
 void AddInputFlags(CLI::App& command, InputFlags& flags) {
@@ -29,7 +34,19 @@ void AddInputFlags(CLI::App& command, InputFlags& flags) {
   command.add_option("--first", flags.first, "First input frame to use");
   command.add_option("--last", flags.last, "Last input frame to use; -1: to the end");
   command.add_option("--stride", flags.stride, "Use every n-th frame");
+  command.add_flag_function(
+      "--loops,!--no-loops",
+      [&flags](std::int64_t given) { flags.loops = given > 0; },
+      "Look for places seen before and spread the drift (the default)");
+  command.add_option("--vocabulary",
+                     flags.vocabulary,
+                     "Visual words for that: our own file or ORB-SLAM's ORBvoc.txt; not needed");
   command.add_option("--fps", flags.fps, "Frames per second where the input has no timestamps");
+}
+
+std::shared_ptr<const Vocabulary> OpenVocabulary(const InputFlags& flags) {
+  if (flags.vocabulary.empty()) return nullptr;
+  return std::make_shared<const Vocabulary>(ReadVocabulary(flags.vocabulary));
 }
 
 Input OpenInput(const InputFlags& flags,

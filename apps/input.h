@@ -5,6 +5,7 @@
 
 #include "apps/command.h"
 #include "rotodom/camera/camera.h"
+#include "rotodom/loop/loop_closure.h"
 #include "rotodom/sequence/sequence.h"
 
 namespace rotslam {
@@ -19,8 +20,11 @@ struct InputFlags {
   std::optional<int> last;
   std::optional<int> stride;
   std::optional<double> fps;
+  std::optional<bool> loops;
+  std::string vocabulary;  // empty: the one that comes with the program
 
   void Override(SequenceOptions& options) const;
+  void Override(LoopOptions& options) const;
 };
 
 void AddInputFlags(CLI::App& command, InputFlags& flags);
@@ -30,6 +34,10 @@ struct Input {
   Camera camera;  // with the size of the images
   std::string camera_file;
 };
+
+/// The vocabulary that --vocabulary names; null when it names none. Throws std::runtime_error with
+/// one clear line.
+std::shared_ptr<const Vocabulary> OpenVocabulary(const InputFlags& flags);
 
 /// Opens the sequence, reads its camera (`flags.camera`, else what lies with the images) and says
 /// what was understood through `tell`. Throws std::runtime_error with one clear line.

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <iterator>
 #include <stdexcept>
+#include <utility>
 
 namespace rotslam {
 
@@ -48,13 +49,19 @@ std::vector<FrameId> FindBreaks(const ViewGraph& graph, const RotationMap& rotat
 }  // namespace
 
 Orientations FindOrientations(Input& input,
-                              const OdometryOptions& options,
+                              const PipelineOptions& options,
+                              std::shared_ptr<const Vocabulary> vocabulary,
                               bool keep_features,
                               const CommonFlags& flags,
                               Progress& progress) {
-  RotationalOdometry odometry(input.camera, options, flags.seed, flags.NumThreads());
+  LoopedOdometry odometry(input.camera,
+                          options.rotodom,
+                          options.loop,
+                          std::move(vocabulary),
+                          keep_features,
+                          flags.seed,
+                          flags.NumThreads());
   Orientations orientations;
-  RotationMap window;  // what is not settled yet
   progress.StartStage("orientations", input.sequence->NumFrames());
   while (const std::optional<Frame> frame = input.sequence->Next()) {
     if (frame->image.empty()) {
@@ -62,21 +69,21 @@ Orientations FindOrientations(Input& input,
                     " skipped, its pose is interpolated: " + frame->problem);
       ++orientations.num_unreadable;
     }
-    FrameEstimate estimate = odometry.AddFrame(frame->id, frame->timestamp_s, frame->image);
+    const LoopedEstimate estimate = odometry.AddFrame(frame->id, frame->timestamp_s, frame->image);
     orientations.timestamps_s.push_back(frame->timestamp_s);
     orientations.num_weak += estimate.report.weak;
     orientations.reports.push_back(estimate.report);
     progress.Step(frame->id.value + 1, std::to_string(estimate.report.num_inliers) + " inliers");
-    window = estimate.window;
-    orientations.Add(std::move(estimate), keep_features);
+    orientations.loops.insert(
+        orientations.loops.end(), estimate.loops.begin(), estimate.loops.end());
   }
-
-  orientations.seconds = odometry.seconds();
-  for (const auto& [frame, rotation] : window) {
-    if (const auto covariance = odometry.CovarianceOf(frame)) {
-      orientations.covariance[frame] = *covariance;
-    }
-  }
+  const std::vector<LoopCheck> last_loops = odometry.Finish();
+  orientations.loops.insert(orientations.loops.end(), last_loops.begin(), last_loops.end());
+  orientations.num_places = odometry.num_places();
+  orientations.seconds = odometry.odometry_seconds();
+  orientations.loop_seconds = odometry.loop_seconds();
+  orientations.global_averaging_seconds = odometry.averaging_seconds();
+  static_cast<OdometryResult&>(orientations) = odometry.TakeResult();
 
   const int num_frames = static_cast<int>(orientations.timestamps_s.size());
   if (num_frames < 3) {
@@ -94,7 +101,7 @@ Orientations FindOrientations(Input& input,
   }
   InterpolateUnconnected(orientations, orientations.cam_from_world);
   orientations.inlier_edges =
-      CountInlierEdges(orientations.graph, orientations.cam_from_world, options.averaging);
+      CountInlierEdges(orientations.graph, orientations.cam_from_world, options.rotodom.averaging);
   orientations.breaks = FindBreaks(orientations.graph, orientations.cam_from_world);
   progress.EndStage(std::to_string(num_frames) + " frames, " +
                     std::to_string(orientations.graph.edges().size()) + " edges");
@@ -141,6 +148,26 @@ std::vector<RotationRow> RotationRows(const Orientations& orientations) {
     if (std::binary_search(orientations.breaks.begin(), orientations.breaks.end(), frame)) {
       row.flags.emplace_back("break");
     }
+    const auto closes_loop = [f = frame](const LoopCheck& check) {
+      return check.accepted && check.frame == f;
+    };
+    if (std::any_of(orientations.loops.begin(), orientations.loops.end(), closes_loop)) {
+      row.flags.emplace_back("loop");
+    }
+  }
+  return rows;
+}
+
+std::vector<LoopRow> LoopRows(const Orientations& orientations) {
+  std::vector<LoopRow> rows;
+  rows.reserve(orientations.loops.size());
+  for (const LoopCheck& check : orientations.loops) {
+    rows.push_back({check.frame.value,
+                    check.match.value,
+                    check.score,
+                    check.num_inliers,
+                    check.angle_deg,
+                    check.accepted});
   }
   return rows;
 }

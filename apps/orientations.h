@@ -4,9 +4,11 @@
 #include <vector>
 
 #include "apps/input.h"
+#include "apps/pipeline.h"
 #include "apps/progress.h"
+#include "output/loops_csv.h"
 #include "output/rotations_csv.h"
-#include "rotodom/odometry.h"
+#include "rotodom/loop/looped_odometry.h"
 #include "rotodom/types/trajectory.h"
 
 namespace rotslam {
@@ -20,7 +22,11 @@ struct Orientations : OdometryResult {
   // Frames that match later frames but none before them: a new piece of the view-graph, whose turn
   // against the piece before is extrapolated.
   std::vector<FrameId> breaks;
+  std::vector<LoopCheck> loops;  // places that looked like older ones
+  int num_places = 0;            // that were remembered
   OdometrySeconds seconds;
+  LoopSeconds loop_seconds;
+  double global_averaging_seconds = 0.0;
   std::vector<FrameReport> reports;     // by frame id
   std::map<FrameId, int> inlier_edges;  // edges that agree with the frame's orientation
 };
@@ -28,8 +34,10 @@ struct Orientations : OdometryResult {
 /// Reads the sequence to its end and finds every frame's orientation. Frames that could not be
 /// matched get theirs by interpolation in time between the nearest frames that could. Throws
 /// std::runtime_error when there are fewer than three frames or no two of them match.
+/// @param vocabulary  null for the one that comes with the program.
 Orientations FindOrientations(Input& input,
-                              const OdometryOptions& options,
+                              const PipelineOptions& options,
+                              std::shared_ptr<const Vocabulary> vocabulary,
                               bool keep_features,
                               const CommonFlags& flags,
                               Progress& progress);
@@ -43,7 +51,10 @@ Trajectory RotationTrajectory(const Orientations& orientations);
 
 /// The lines of rotations.csv. Flags: `predicted` (matches no other frame, interpolated), `weak`
 /// (its best edge has fewer inliers than asked for), `searched_wide` (the prediction did not guide
-/// the matching), `break` (matches none before it).
+/// the matching), `break` (matches none before it), `loop` (sees a place that was seen before).
 std::vector<RotationRow> RotationRows(const Orientations& orientations);
+
+/// The lines of loops.csv.
+std::vector<LoopRow> LoopRows(const Orientations& orientations);
 
 }  // namespace rotslam

@@ -7,6 +7,7 @@ namespace rotslam {
 std::optional<std::string> PipelineOptions::Problem() const {
   if (auto problem = ProblemIn("sequence", sequence)) return problem;
   if (auto problem = ProblemIn("rotodom", rotodom)) return problem;
+  if (auto problem = ProblemIn("loop", loop)) return problem;
   if (auto problem = ProblemIn("held_stretches", held_stretches)) return problem;
   if (auto problem = ProblemIn("keyframes", keyframes)) return problem;
   if (auto problem = ProblemIn("krot", krot)) return problem;
@@ -22,6 +23,7 @@ PipelineOptions ReadPipelineOptions(const CommonFlags& common, const InputFlags&
   PipelineOptions options;
   if (!common.config.empty()) LoadOptionsYaml(common.config, options);
   input.Override(options.sequence);
+  input.Override(options.loop);
   options.krot.seed = common.seed;
   return options;
 }

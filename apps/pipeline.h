@@ -9,6 +9,7 @@
 #include "ba/resection.h"
 #include "krot/held_stretches.h"
 #include "krot/known_rotation.h"
+#include "rotodom/loop/loop_closure.h"
 #include "rotodom/odometry.h"
 #include "rotodom/sequence/sequence.h"
 #include "rotodom/tracks/keyframes.h"
@@ -19,6 +20,7 @@ namespace rotslam {
 struct PipelineOptions {
   SequenceOptions sequence;
   OdometryOptions rotodom;
+  LoopOptions loop;
   HeldStretchOptions held_stretches;
   KeyframeOptions keyframes;
   KrotOptions krot;
@@ -33,6 +35,7 @@ struct PipelineOptions {
   void Visit(Visitor&& visit) {
     visit("sequence", sequence);
     visit("rotodom", rotodom);
+    visit("loop", loop);
     visit("held_stretches", held_stretches);
     visit("keyframes", keyframes);
     visit("krot", krot);

@@ -1,6 +1,7 @@
 #include <chrono>
 #include <memory>
 #include <string>
+#include <utility>
 
 #include "apps/command.h"
 #include "apps/orientations.h"
@@ -26,16 +27,17 @@ int FindAndWriteRotations(const RotationsFlags& flags) {
 
   Input input = OpenInput(
       flags.input, options.sequence, [&](const std::string& line) { progress.Say(line); });
+  auto vocabulary = OpenVocabulary(flags.input);
   const std::filesystem::path directory = PrepareRunDirectory(flags.input.out);
   const Orientations orientations =
-      FindOrientations(input, options.rotodom, false, flags.common, progress);
+      FindOrientations(input, options, std::move(vocabulary), false, flags.common, progress);
   WriteOrientations(directory, orientations);
   RunSummary summary = StartSummary("rotations", input, orientations, DescribeOptions(options));
   summary.seconds.push_back(
       {"total", std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count()});
   WriteSummary(directory / "summary.json", summary);
   progress.Say("wrote " + (directory / "rotations_tum.txt").string() +
-               ", rotations.csv, view_graph.g2o, summary.json");
+               ", rotations.csv, loops.csv, view_graph.g2o, summary.json");
   return 0;
 }
 

@@ -1,6 +1,7 @@
 #include <chrono>
 #include <memory>
 #include <stdexcept>
+#include <utility>
 
 #include "apps/command.h"
 #include "apps/orientations.h"
@@ -32,9 +33,10 @@ int Run(const RunFlags& flags) {
 
   Input input = OpenInput(
       flags.input, options.sequence, [&](const std::string& line) { progress.Say(line); });
+  auto vocabulary = OpenVocabulary(flags.input);
   const std::filesystem::path directory = PrepareRunDirectory(flags.input.out);
   const Orientations orientations =
-      FindOrientations(input, options.rotodom, true, flags.common, progress);
+      FindOrientations(input, options, std::move(vocabulary), true, flags.common, progress);
   WriteOrientations(directory, orientations);
   const double orientations_s = SecondsSince(start);
 
@@ -62,7 +64,8 @@ int Run(const RunFlags& flags) {
   progress.Say(
       "wrote " + directory.string() +
       ": trajectory_tum.txt, trajectory_kitti.txt, keyframes_tum.txt, "
-      "rotations_tum.txt, rotations.csv, cloud.ply, segments.csv, view_graph.g2o, summary.json");
+      "rotations_tum.txt, rotations.csv, loops.csv, cloud.ply, segments.csv, view_graph.g2o, "
+      "summary.json");
   if (positions.failure.empty()) return 0;
   throw std::runtime_error("orientations are in " + directory.string() +
                            ", positions are not: " + positions.failure);

@@ -9,6 +9,7 @@
 
 #include "output/atomic_file.h"
 #include "output/g2o.h"
+#include "output/loops_csv.h"
 #include "output/ply.h"
 #include "output/rotations_csv.h"
 #include "output/segments.h"
@@ -83,6 +84,7 @@ std::filesystem::path PrepareRunDirectory(const std::string& out) {
 void WriteOrientations(const std::filesystem::path& directory, const Orientations& orientations) {
   WriteTumTrajectory(directory / "rotations_tum.txt", RotationTrajectory(orientations));
   WriteRotationsCsv(directory / "rotations.csv", RotationRows(orientations));
+  WriteLoopsCsv(directory / "loops.csv", LoopRows(orientations));
   WriteG2o(directory / "view_graph.g2o", {orientations.graph, orientations.cam_from_world, {}});
 }
 
@@ -143,7 +145,18 @@ RunSummary StartSummary(const std::string& command,
                      {"detection", seconds.detection},
                      {"edges", seconds.edges},
                      {"averaging", seconds.averaging},
-                     {"covariance", seconds.covariance}};
+                     {"covariance", seconds.covariance},
+                     {"loop_description", orientations.loop_seconds.description},
+                     {"loop_candidates", orientations.loop_seconds.candidates},
+                     {"loop_verification", orientations.loop_seconds.verification},
+                     {"global_averaging", orientations.global_averaging_seconds}};
+  summary.loops =
+      SummaryTable{{"places", std::int64_t{orientations.num_places}},
+                   {"candidates", count(orientations.loops.size())},
+                   {"accepted",
+                    count(std::count_if(orientations.loops.begin(),
+                                        orientations.loops.end(),
+                                        [](const LoopCheck& check) { return check.accepted; }))}};
   return summary;
 }
 

@@ -1,32 +1,18 @@
 #include "rotodom/odometry.h"
 
 #include <algorithm>
-#include <chrono>
 #include <iterator>
 #include <stdexcept>
 
+#include "rotodom/tracking/shutter.h"
 #include "rotodom/types/options.h"
+#include "rotodom/types/stopwatch.h"
 
 namespace rotslam {
 namespace {
 
 // Two measurements of one rotation, the rougher by unrefined corners, differ by less.
 constexpr double kSameRotationDeg = 3.0;
-
-// Adds the time until it goes out of scope.
-class Stopwatch {
- public:
-  explicit Stopwatch(double& seconds) : seconds_(seconds) {}
-  ~Stopwatch() {
-    seconds_ += std::chrono::duration<double>(std::chrono::steady_clock::now() - start_).count();
-  }
-  Stopwatch(const Stopwatch&) = delete;
-  Stopwatch& operator=(const Stopwatch&) = delete;
-
- private:
-  double& seconds_;
-  std::chrono::steady_clock::time_point start_ = std::chrono::steady_clock::now();
-};
 
 const Connection* BestOf(const std::vector<Connection>& connections) {
   const auto best = std::max_element(
@@ -52,20 +38,6 @@ void MarkLostPoints(const std::vector<Connection>& connections, View& view) {
   }
   view.is_lost.assign(view.features.size(), false);
   for (std::size_t n = 0; n < votes.size(); ++n) view.is_lost[n] = votes[n] < 0;
-}
-
-// What a keypoint sees, as if its row had been exposed in the middle of the frame.
-// @param rate           of the camera's rotation, rad/s in camera axes.
-// @param flow_px_per_s  motion of the keypoint beside that.
-std::optional<Eigen::Vector3d> BearingOf(const Eigen::Vector2d& keypoint_px,
-                                         const Camera& camera,
-                                         const Eigen::Vector3d& rate,
-                                         const Eigen::Vector2d& flow_px_per_s) {
-  if (camera.readout_s == 0.0) return camera.Unproject(keypoint_px);
-  const double late_s = camera.RowTime(keypoint_px.y());
-  const auto bearing = camera.Unproject(keypoint_px - late_s * flow_px_per_s);
-  if (!bearing) return std::nullopt;
-  return Rotation::Exp(-late_s * rate) * *bearing;
 }
 
 // Gives later stages, which know of no shutter, the keypoints that a global one would have seen.
@@ -276,7 +248,7 @@ void RotationalOdometry::CarryOn(const TrackingResult& tracked,
   for (const TrackedPoint& point : tracked.points) {
     const View& view = *views[point.view].view;
     const auto bearing =
-        BearingOf(point.keypoint_px, camera_, rate, view.flow_px_per_s[point.index]);
+        BearingInMidFrame(point.keypoint_px, camera_, rate, view.flow_px_per_s[point.index]);
     if (!bearing) continue;
     const Features& from = view.features;
     features.keypoints_px.push_back(point.keypoint_px);
@@ -301,8 +273,7 @@ void RotationalOdometry::DetectNewFeatures(const cv::Mat& image,
     // Its place is its patch's: it errs only where the patch is found again.
     features.covariances_px.emplace_back(Eigen::Matrix2f::Zero());
     if (camera_.readout_s == 0.0) continue;
-    if (const auto bearing =
-            BearingOf(features.keypoints_px[n], camera_, rate, Eigen::Vector2d::Zero())) {
+    if (const auto bearing = BearingInMidFrame(features.keypoints_px[n], camera_, rate)) {
       features.bearings[n] = *bearing;
     }
   }
@@ -323,7 +294,7 @@ void RotationalOdometry::ReviseNewestView(double timestamp_s,
                                (timestamp_s - timestamps_s_.at(before->first));
   for (int n = 0; n < view.features.size(); ++n) {
     const auto bearing =
-        BearingOf(view.features.keypoints_px[n], camera_, rate, view.flow_px_per_s[n]);
+        BearingInMidFrame(view.features.keypoints_px[n], camera_, rate, view.flow_px_per_s[n]);
     if (bearing) view.features.bearings[n] = *bearing;
   }
   estimate.revised_features = view.features;

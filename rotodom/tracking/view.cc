@@ -3,12 +3,16 @@
 namespace rotslam {
 
 int CountCommonTracks(const Features& a, const Features& b) {
+  return CountCommonTracks(a.tracks, b.tracks);
+}
+
+int CountCommonTracks(const std::vector<TrackId>& a, const std::vector<TrackId>& b) {
   int count = 0;
   std::size_t i = 0;
   std::size_t j = 0;
-  while (i < a.tracks.size() && j < b.tracks.size()) {
-    const bool i_first = a.tracks[i] <= b.tracks[j];
-    const bool j_first = b.tracks[j] <= a.tracks[i];
+  while (i < a.size() && j < b.size()) {
+    const bool i_first = a[i] <= b[j];
+    const bool j_first = b[j] <= a[i];
     count += i_first && j_first;
     i += i_first;
     j += j_first;

@@ -26,7 +26,9 @@ struct OrientedView {
   Rotation cam_from_world;
 };
 
-/// Number of points that both frames show; both `tracks` ascend.
+/// Number of points that both frames show; both lists ascend.
+int CountCommonTracks(const std::vector<TrackId>& a, const std::vector<TrackId>& b);
+/// The same of their `tracks`.
 int CountCommonTracks(const Features& a, const Features& b);
 
 }  // namespace rotslam

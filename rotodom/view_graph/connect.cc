@@ -8,40 +8,39 @@
 namespace rotslam {
 namespace {
 
-struct CommonPoints {
-  std::vector<BearingPair> bearings;
+std::vector<std::array<int, 2>> FindCommonPoints(const Features& view_i, const Features& view_j) {
   std::vector<std::array<int, 2>> keypoints;
-};
-
-CommonPoints FindCommonPoints(const Features& view_i, const Features& view_j) {
-  CommonPoints common;
   int i = 0;
   int j = 0;
   while (i < view_i.size() && j < view_j.size()) {
     const TrackId track_i = view_i.tracks[i];
     const TrackId track_j = view_j.tracks[j];
-    if (track_i == track_j) {
-      common.bearings.push_back({view_i.bearings[i], view_j.bearings[j]});
-      common.keypoints.push_back({i, j});
-    }
+    if (track_i == track_j) keypoints.push_back({i, j});
     i += track_i <= track_j;
     j += track_j <= track_i;
   }
-  return common;
+  return keypoints;
 }
 
-std::optional<Connection> Connect(const Features& view_i,
-                                  const Features& view_j,
-                                  const Rotation& predicted_j_from_i,
-                                  double focal_px,
-                                  const ConnectOptions& options) {
-  const CommonPoints common = FindCommonPoints(view_i, view_j);
+}  // namespace
+
+std::optional<Connection> ConnectByMatches(const Features& view_i,
+                                           const Features& view_j,
+                                           const std::vector<std::array<int, 2>>& keypoints,
+                                           const Rotation& predicted_j_from_i,
+                                           double focal_px,
+                                           const ConnectOptions& options) {
+  std::vector<BearingPair> pairs;
+  pairs.reserve(keypoints.size());
+  for (const auto& [of_i, of_j] : keypoints) {
+    pairs.push_back({view_i.bearings[of_i], view_j.bearings[of_j]});
+  }
   const FrameId i = view_i.frame;
   const FrameId j = view_j.frame;
   const std::uint64_t seed = options.seed * 0x9E3779B97F4A7C15ULL +
                              (std::uint64_t(i.value) << 32 | std::uint32_t(j.value));
   const auto estimate = EstimateRelativeRotation(
-      common.bearings, predicted_j_from_i, focal_px, options.relative_rotation, seed);
+      pairs, predicted_j_from_i, focal_px, options.relative_rotation, seed);
   if (!estimate) return std::nullopt;
 
   Connection connection;
@@ -55,18 +54,16 @@ std::optional<Connection> Connect(const Features& view_i,
   connection.edge.noise_px = estimate->noise_px;
   connection.edge.parallax_px = estimate->parallax_px;
   std::size_t next_inlier = 0;
-  for (int k = 0; k < static_cast<int>(common.keypoints.size()); ++k) {
+  for (int k = 0; k < static_cast<int>(keypoints.size()); ++k) {
     if (next_inlier < estimate->inliers.size() && estimate->inliers[next_inlier] == k) {
-      connection.matches.pairs.push_back(common.keypoints[k]);
+      connection.matches.pairs.push_back(keypoints[k]);
       ++next_inlier;
     } else {
-      connection.outliers_j.push_back(common.keypoints[k][1]);
+      connection.outliers_j.push_back(keypoints[k][1]);
     }
   }
   return connection;
 }
-
-}  // namespace
 
 std::optional<std::string> ViewGraphOptions::Problem() const {
   if (window_frames < 1) return OutOfRange("window_frames", window_frames, "at least 1");
@@ -95,8 +92,12 @@ std::vector<Connection> ConnectView(const Features& view,
   const Rotation& view_from_world = predicted_cam_from_world.at(view.frame);
   ParallelFor(static_cast<int>(others.size()), options.num_threads, [&](int k) {
     const Rotation& other_from_world = predicted_cam_from_world.at(others[k]->frame);
-    connections[k] =
-        Connect(*others[k], view, view_from_world * other_from_world.Inverse(), focal_px, options);
+    connections[k] = ConnectByMatches(*others[k],
+                                      view,
+                                      FindCommonPoints(*others[k], view),
+                                      view_from_world * other_from_world.Inverse(),
+                                      focal_px,
+                                      options);
   });
   std::vector<Connection> found;
   for (std::optional<Connection>& connection : connections) {

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <array>
 #include <cstdint>
 #include <optional>
 #include <string>
@@ -57,6 +58,16 @@ struct ConnectOptions {
   std::uint64_t seed = 1;
   int num_threads = 1;
 };
+
+/// The edge between two views from keypoints that seem to show the same points.
+/// @param keypoints  of view_i and of view_j.
+/// @return  nullopt when fewer than relative_rotation.min_inliers of them agree.
+std::optional<Connection> ConnectByMatches(const Features& view_i,
+                                           const Features& view_j,
+                                           const std::vector<std::array<int, 2>>& keypoints,
+                                           const Rotation& predicted_j_from_i,
+                                           double focal_px,
+                                           const ConnectOptions& options);
 
 /// Estimates the relative rotations between `view` and each of `others` from the points that both
 /// show.

@@ -1,0 +1,23 @@
+#pragma once
+
+#include <filesystem>
+#include <vector>
+
+namespace rotslam {
+
+/// A frame that looked like an older one, and whether geometry agreed.
+struct LoopRow {
+  int frame = 0;
+  int match = 0;           // the older frame
+  double score = 0.0;      // of their visual words, 0 to 1
+  int inliers = 0;         // matches that agree with the relative rotation
+  double angle_deg = 0.0;  // of the rotation around the loop, before it was closed
+  bool accepted = false;
+};
+
+/// loops.csv: `frame,match,score,inliers,angle_deg,accepted`, one line per row; accepted is 1 or 0.
+/// Throws std::invalid_argument for a number that is not finite, std::runtime_error when the file
+/// cannot be written; never leaves half a file.
+void WriteLoopsCsv(const std::filesystem::path& path, const std::vector<LoopRow>& rows);
+
+}  // namespace rotslam

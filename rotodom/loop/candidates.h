@@ -1,0 +1,83 @@
+#pragma once
+
+#include <map>
+#include <optional>
+#include <set>
+#include <string>
+#include <vector>
+
+#include "rotodom/loop/place_database.h"
+#include "rotodom/loop/vocabulary.h"
+#include "rotodom/types/ids.h"
+
+namespace rotslam {
+
+struct CandidateOptions {
+  // A frame is no loop of the ones that came less than this many frames before it.
+  int recent_frames = 10;
+  // Only places with more than this part of the most common words are looked at.
+  double common_words_ratio = 0.8;
+  // Of the groups of places that see the same scene, those whose scores add up to more than this
+  // part of the best group's.
+  double group_score_ratio = 0.75;
+  // Neighbours whose scores are added to a place's own.
+  int group_size = 10;
+
+  std::optional<std::string> Problem() const;
+
+  template <class Visitor>
+  void Visit(Visitor&& visit) {
+    visit("recent_frames", recent_frames);
+    visit("common_words_ratio", common_words_ratio);
+    visit("group_score_ratio", group_score_ratio);
+    visit("group_size", group_size);
+  }
+};
+
+/// An older place that looks like the present one.
+struct LoopCandidate {
+  FrameId frame;
+  double score = 0.0;        // Score() of the two bags
+  double group_score = 0.0;  // its neighbours' added
+  // Places in a row that have led to the same group, this one included.
+  int num_consistent = 0;
+};
+
+/// Remembers what places look like and which of them see the same scene, and finds the ones that
+/// look like a new one.
+/// Memory: PlaceDatabase's.
+/// Source:  Mur-Artal & Tardos, Fast Relocalisation and Loop Closing in Keyframe-Based SLAM, ICRA
+/// 2014: score relative to the neighbours', groups of covisible places, temporal consistency.
+class CandidateFinder {
+ public:
+  /// Throws std::invalid_argument when an option is out of range.
+  CandidateFinder(int num_words, const CandidateOptions& options);
+
+  /// Adds a place and finds those that look like it, best group first.
+  /// @param neighbours  older places that see part of the same scene, those that share most first.
+  std::vector<LoopCandidate> AddPlace(FrameId frame,
+                                      const BagOfWords& bag,
+                                      const std::vector<FrameId>& neighbours);
+
+  /// From now on the two count as seeing the same scene.
+  void Join(FrameId a, FrameId b);
+
+  /// Those that share most first, places joined later behind them.
+  const std::vector<FrameId>& NeighboursOf(FrameId place) const;
+
+ private:
+  // Places that see one scene, and how many places in a row have led to some of them.
+  struct Group {
+    std::set<FrameId> places;
+    int num_consistent = 0;
+  };
+  std::vector<LoopCandidate> BestOfGroups(const std::vector<PlaceMatch>& matches) const;
+  void CheckConsistency(std::vector<LoopCandidate>& candidates);
+
+  CandidateOptions options_;
+  PlaceDatabase database_;
+  std::map<FrameId, std::vector<FrameId>> neighbours_;
+  std::vector<Group> last_groups_;
+};
+
+}  // namespace rotslam

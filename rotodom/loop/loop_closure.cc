@@ -1,0 +1,244 @@
+#include "rotodom/loop/loop_closure.h"
+
+#include <algorithm>
+#include <array>
+#include <iterator>
+#include <numeric>
+#include <stdexcept>
+#include <utility>
+
+#include "rotodom/tracking/shutter.h"
+#include "rotodom/tracking/view.h"
+#include "rotodom/types/options.h"
+#include "rotodom/types/stopwatch.h"
+
+namespace rotslam {
+namespace {
+
+// By point: the nearest of `others`, -1 when none lies within a pixel and a half.
+std::vector<int> FindNearest(const std::vector<Eigen::Vector2d>& points_px,
+                             const std::vector<Eigen::Vector2d>& others_px) {
+  constexpr double kReachPx = 1.5;
+  std::vector<int> by_x(others_px.size());
+  std::iota(by_x.begin(), by_x.end(), 0);
+  std::sort(by_x.begin(), by_x.end(), [&](int a, int b) {
+    return std::pair(others_px[a].x(), a) < std::pair(others_px[b].x(), b);
+  });
+  std::vector<int> nearest(points_px.size(), -1);
+  for (std::size_t n = 0; n < points_px.size(); ++n) {
+    const Eigen::Vector2d& point_px = points_px[n];
+    double least = kReachPx * kReachPx;
+    auto other = std::lower_bound(
+        by_x.begin(), by_x.end(), point_px.x() - kReachPx, [&](int index, double x) {
+          return others_px[index].x() < x;
+        });
+    for (; other != by_x.end() && others_px[*other].x() <= point_px.x() + kReachPx; ++other) {
+      const double squared = (others_px[*other] - point_px).squaredNorm();
+      if (squared > least) continue;
+      least = squared;
+      nearest[n] = *other;
+    }
+  }
+  return nearest;
+}
+
+// Matches of corners, as matches of the features at the same spots.
+std::vector<std::array<int, 2>> MatchesOfFeatures(const std::vector<std::array<int, 2>>& corners,
+                                                  const std::vector<int>& features_i,
+                                                  const std::vector<int>& features_j) {
+  std::vector<std::array<int, 2>> matches;
+  for (const auto& [i, j] : corners) {
+    if (features_i[i] >= 0 && features_j[j] >= 0) matches.push_back({features_i[i], features_j[j]});
+  }
+  return matches;
+}
+
+}  // namespace
+
+std::optional<std::string> LoopOptions::Problem() const {
+  if (!(place_overlap > 0.0 && place_overlap <= 1.0)) {
+    return OutOfRange("place_overlap", place_overlap, "above 0 and at most 1");
+  }
+  if (!(min_correction_deg >= 0.0)) {
+    return OutOfRange("min_correction_deg", min_correction_deg, "zero or more");
+  }
+  if (!(max_shutter_error_deg > 0.0)) {
+    return OutOfRange("max_shutter_error_deg", max_shutter_error_deg, "above 0");
+  }
+  if (min_common_points < 1) {
+    return OutOfRange("min_common_points", min_common_points, "at least 1");
+  }
+  if (max_candidates < 1) return OutOfRange("max_candidates", max_candidates, "at least 1");
+  if (max_neighbours < 0) return OutOfRange("max_neighbours", max_neighbours, "zero or more");
+  if (auto problem = ProblemIn("candidates", candidates)) return problem;
+  return ProblemIn("verification", verification);
+}
+
+LoopClosure::LoopClosure(const Camera& camera,
+                         const LoopOptions& options,
+                         const OdometryOptions& odometry,
+                         std::shared_ptr<const Vocabulary> vocabulary,
+                         std::uint64_t seed,
+                         int num_threads)
+    : camera_(camera),
+      options_(options),
+      feature_options_(odometry.features),
+      tools_{odometry.matching, odometry.relative_rotation, seed, num_threads},
+      vocabulary_(std::move(vocabulary)),
+      finder_(vocabulary_->num_words(), options.candidates) {
+  if (const auto problem = options.Problem()) throw std::invalid_argument("loop: " + *problem);
+}
+
+LoopReport LoopClosure::AddFrame(const FrameEstimate& estimate,
+                                 const cv::Mat& image,
+                                 const RotationMap& cam_from_world) {
+  timestamps_s_[estimate.frame] = estimate.timestamp_s;
+  LoopReport report = Finish(cam_from_world);
+  FindPiece(estimate);
+  if (IsNewPlace(estimate)) pending_ = Describe(estimate, image);
+  return report;
+}
+
+LoopReport LoopClosure::Finish(const RotationMap& cam_from_world) {
+  if (!pending_) return {};
+  PendingPlace pending = *std::move(pending_);
+  pending_.reset();
+  Place& place = pending.place;
+  LoopReport report;
+  if (!TakeOutShutter(cam_from_world, place.corners)) return report;
+  place.features = FindNearest(place.corners.keypoints_px, pending.features_px);
+  const FrameId frame = place.corners.frame;
+  const std::vector<LoopCandidate> candidates = FindCandidates(place);
+  const std::size_t count =
+      std::min(candidates.size(), static_cast<std::size_t>(options_.max_candidates));
+  for (std::size_t k = 0; k < count && report.connections.empty(); ++k) {
+    report.checks.push_back(Verify(place, candidates[k], cam_from_world, report.connections));
+  }
+  for (const Connection& connection : report.connections) {
+    finder_.Join(connection.edge.i, frame);
+    JoinPieces(pieces_.at(connection.edge.i), pieces_.at(frame));
+  }
+  places_.emplace(frame, std::move(place));
+  return report;
+}
+
+void LoopClosure::FindPiece(const FrameEstimate& estimate) {
+  if (estimate.connections.empty()) {
+    pieces_[estimate.frame] = estimate.frame.value;
+    return;
+  }
+  pieces_[estimate.frame] = pieces_.at(estimate.connections.front().edge.i);
+  for (const Connection& connection : estimate.connections) {
+    JoinPieces(pieces_.at(connection.edge.i), pieces_.at(estimate.frame));
+  }
+}
+
+void LoopClosure::JoinPieces(int a, int b) {
+  if (a == b) return;
+  for (auto& [frame, piece] : pieces_) {
+    if (piece == a) piece = b;
+  }
+}
+
+bool LoopClosure::IsNewPlace(const FrameEstimate& estimate) const {
+  const Features& features = estimate.features;
+  if (features.size() < options_.verification.min_inliers) return false;
+  if (places_.empty()) return true;
+  const std::vector<TrackId>& last = std::prev(places_.end())->second.tracks;
+  return CountCommonTracks(last, features.tracks) < options_.place_overlap * features.size();
+}
+
+LoopClosure::PendingPlace LoopClosure::Describe(const FrameEstimate& estimate,
+                                                const cv::Mat& image) {
+  const Stopwatch stopwatch(seconds_.description);
+  PendingPlace pending;
+  Place& place = pending.place;
+  place.corners.frame = estimate.frame;
+  const ImagePyramid pyramid = BuildPyramid(ToGrey(image), feature_options_);
+  DetectFeatures(pyramid, camera_, feature_options_, tools_.num_threads, place.corners);
+  DescribeFeatures(pyramid, tools_.num_threads, place.corners);
+  place.corners.rgb = {};
+  place.tracks = estimate.features.tracks;
+  pending.features_px = estimate.features.keypoints_px;
+  return pending;
+}
+
+bool LoopClosure::TakeOutShutter(const RotationMap& cam_from_world, Features& corners) const {
+  if (camera_.readout_s == 0.0) return true;
+  const auto here = cam_from_world.find(corners.frame);
+  if (here == cam_from_world.begin() || std::next(here) == cam_from_world.end()) return false;
+  const auto rate_between = [&](const auto& from, const auto& to) -> Eigen::Vector3d {
+    return (to->second * from->second.Inverse()).Log() /
+           (timestamps_s_.at(to->first) - timestamps_s_.at(from->first));
+  };
+  const Eigen::Vector3d rate = rate_between(std::prev(here), std::next(here));
+  const Eigen::Vector3d change =
+      rate_between(here, std::next(here)) - rate_between(std::prev(here), here);
+  // The rate in mid-frame is known to half its change, the first row is half a readout away.
+  const double error_deg = 0.25 * camera_.readout_s * change.norm() * kDegFromRad;
+  if (error_deg > options_.max_shutter_error_deg) return false;
+  for (int n = 0; n < corners.size(); ++n) {
+    const auto bearing = BearingInMidFrame(corners.keypoints_px[n], camera_, rate);
+    if (!bearing) continue;
+    corners.bearings[n] = *bearing;
+    if (const auto moved = camera_.Project(*bearing)) corners.keypoints_px[n] = *moved;
+  }
+  return true;
+}
+
+std::vector<FrameId> LoopClosure::NeighboursOf(const Place& place) const {
+  std::vector<std::pair<int, FrameId>> common;
+  for (auto older = places_.rbegin(); older != places_.rend(); ++older) {
+    const int count = CountCommonTracks(older->second.tracks, place.tracks);
+    // Tracks do not come back: older places have no more of them.
+    if (count < options_.min_common_points) break;
+    common.emplace_back(count, older->first);
+  }
+  std::stable_sort(
+      common.begin(), common.end(), [](const auto& a, const auto& b) { return a.first > b.first; });
+  std::vector<FrameId> neighbours;
+  neighbours.reserve(common.size());
+  for (const auto& [count, frame] : common) neighbours.push_back(frame);
+  return neighbours;
+}
+
+std::vector<LoopCandidate> LoopClosure::FindCandidates(const Place& place) {
+  const Stopwatch stopwatch(seconds_.candidates);
+  const ImageWords words =
+      vocabulary_->Transform(ToBinaryDescriptors(place.corners.descriptors), 0);
+  return finder_.AddPlace(place.corners.frame, words.bag, NeighboursOf(place));
+}
+
+LoopCheck LoopClosure::Verify(const Place& place,
+                              const LoopCandidate& candidate,
+                              const RotationMap& cam_from_world,
+                              std::vector<Connection>& connections) {
+  const Stopwatch stopwatch(seconds_.verification);
+  const FrameId frame = place.corners.frame;
+  std::vector<const Features*> old_places = {&places_.at(candidate.frame).corners};
+  for (const FrameId neighbour : finder_.NeighboursOf(candidate.frame)) {
+    if (static_cast<int>(old_places.size()) > options_.max_neighbours) break;
+    if (neighbour != frame) old_places.push_back(&places_.at(neighbour).corners);
+  }
+  LoopEvidence evidence = VerifyLoop(place.corners,
+                                     old_places,
+                                     cam_from_world,
+                                     candidate.num_consistent,
+                                     pieces_.at(candidate.frame) == pieces_.at(frame),
+                                     camera_,
+                                     options_.verification,
+                                     tools_);
+  connections = std::move(evidence.connections);
+  for (Connection& connection : connections) {
+    connection.matches.pairs = MatchesOfFeatures(
+        connection.matches.pairs, places_.at(connection.edge.i).features, place.features);
+  }
+  return {frame,
+          evidence.match,
+          candidate.score,
+          evidence.num_inliers,
+          evidence.angle_deg,
+          evidence.accepted};
+}
+
+}  // namespace rotslam

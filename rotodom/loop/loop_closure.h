@@ -1,0 +1,150 @@
+#pragma once
+
+#include <cstdint>
+#include <map>
+#include <memory>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include <opencv2/core.hpp>
+
+#include "rotodom/loop/candidates.h"
+#include "rotodom/loop/verification.h"
+#include "rotodom/loop/vocabulary.h"
+#include "rotodom/odometry.h"
+
+namespace rotslam {
+
+struct LoopOptions {
+  // Look for places seen before; what is remembered then grows with the sequence.
+  bool use_loops = true;
+  // A frame that shares less than this part of its points with the last place is the next one.
+  // More places find more loops and take more time and memory.
+  double place_overlap = 0.5;
+  // With a rolling shutter, a frame during which the rotation's rate changes is distorted in a way
+  // that is not known; beyond this, at the image's border, a steadier one becomes the place.
+  double max_shutter_error_deg = 0.1;
+  // A loop that turns the present orientation by less than this waits for the next one, or for the
+  // end, before all orientations are averaged.
+  double min_correction_deg = 0.2;
+  // A place sees the same scene as another when they have this many points in common.
+  int min_common_points = 15;
+  // Candidates that are verified for one place, and places around each that are asked as well.
+  int max_candidates = 3;
+  int max_neighbours = 4;
+  CandidateOptions candidates;
+  VerificationOptions verification;
+
+  std::optional<std::string> Problem() const;
+
+  template <class Visitor>
+  void Visit(Visitor&& visit) {
+    visit("use_loops", use_loops);
+    visit("place_overlap", place_overlap);
+    visit("max_shutter_error_deg", max_shutter_error_deg);
+    visit("min_correction_deg", min_correction_deg);
+    visit("min_common_points", min_common_points);
+    visit("max_candidates", max_candidates);
+    visit("max_neighbours", max_neighbours);
+    visit("candidates", candidates);
+    visit("verification", verification);
+  }
+};
+
+/// A place that looked like an older one, and what geometry said.
+struct LoopCheck {
+  FrameId frame;
+  FrameId match;
+  double score = 0.0;
+  int num_inliers = 0;
+  // Of the rotation around the loop: measured edge against the orientations before it.
+  double angle_deg = 0.0;
+  bool accepted = false;
+};
+
+/// What became of one frame.
+struct LoopReport {
+  std::vector<LoopCheck> checks;
+  std::vector<Connection> connections;  // from older places to it, accepted ones only
+};
+
+/// Where the time goes, seconds since the start.
+struct LoopSeconds {
+  double description = 0.0;
+  double candidates = 0.0;  // words included
+  double verification = 0.0;
+};
+
+/// Finds out when the camera is back: remembers frames that see something new as places, in visual
+/// words, looks for older places that look like a new one, and verifies them by matching and
+/// relative rotation.
+/// Memory: described corners of every place, 180 KB at 2,000 corners, and PlaceDatabase's.
+class LoopClosure {
+ public:
+  /// Throws std::invalid_argument when an option is out of range.
+  LoopClosure(const Camera& camera,
+              const LoopOptions& options,
+              const OdometryOptions& odometry,
+              std::shared_ptr<const Vocabulary> vocabulary,
+              std::uint64_t seed,
+              int num_threads);
+
+  /// Takes what the odometry said of the next frame, and says what became of the frame before it:
+  /// only now is the rate of its rotation known, which a rolling shutter needs.
+  /// @param image           the frame's.
+  /// @param cam_from_world  present orientations of all frames so far.
+  LoopReport AddFrame(const FrameEstimate& estimate,
+                      const cv::Mat& image,
+                      const RotationMap& cam_from_world);
+
+  /// After the last frame: what became of that.
+  LoopReport Finish(const RotationMap& cam_from_world);
+
+  int num_places() const { return static_cast<int>(places_.size()); }
+  const LoopSeconds& seconds() const { return seconds_; }
+
+ private:
+  // A frame as it is remembered. Points that were followed here have descriptors of where they
+  // came from; corners found anew are found again when the camera comes back.
+  struct Place {
+    Features corners;             // described
+    std::vector<TrackId> tracks;  // that the frame shows
+    // By corner: the frame's feature there, -1 for none.
+    std::vector<int> features;
+  };
+  // The newest one, as long as the rotation after it is not known.
+  struct PendingPlace {
+    Place place;
+    std::vector<Eigen::Vector2d> features_px;  // the frame's
+  };
+
+  // Pieces of the view-graph, by frame: between two of them no way is known.
+  void FindPiece(const FrameEstimate& estimate);
+  void JoinPieces(int a, int b);
+  bool IsNewPlace(const FrameEstimate& estimate) const;
+  PendingPlace Describe(const FrameEstimate& estimate, const cv::Mat& image);
+  // Moves the corners to where a global shutter would have seen them; false when that is not known
+  // well enough.
+  bool TakeOutShutter(const RotationMap& cam_from_world, Features& corners) const;
+  std::vector<FrameId> NeighboursOf(const Place& place) const;
+  std::vector<LoopCandidate> FindCandidates(const Place& place);
+  LoopCheck Verify(const Place& place,
+                   const LoopCandidate& candidate,
+                   const RotationMap& cam_from_world,
+                   std::vector<Connection>& connections);
+
+  Camera camera_;
+  LoopOptions options_;
+  FeatureOptions feature_options_;
+  VerificationTools tools_;
+  std::shared_ptr<const Vocabulary> vocabulary_;
+  CandidateFinder finder_;
+  std::map<FrameId, Place> places_;
+  std::map<FrameId, int> pieces_;
+  std::optional<PendingPlace> pending_;
+  std::map<FrameId, double> timestamps_s_;
+  LoopSeconds seconds_;
+};
+
+}  // namespace rotslam

@@ -1,0 +1,151 @@
+#include "rotodom/loop/verification.h"
+
+#include <cmath>
+
+#include <Eigen/Eigenvalues>
+
+#include "rotodom/types/options.h"
+
+namespace rotslam {
+namespace {
+
+double LargestSigmaDeg(const Eigen::Matrix3d& covariance) {
+  const Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> eigen(covariance, Eigen::EigenvaluesOnly);
+  return std::sqrt(eigen.eigenvalues()[2]) * kDegFromRad;
+}
+
+class Verifier {
+ public:
+  Verifier(const Features& view,
+           const Camera& camera,
+           const VerificationOptions& options,
+           const VerificationTools& tools)
+      : view_(view), camera_(camera), options_(options), tools_(tools) {}
+
+  // The edge from an old place; nullopt where too few matches agree.
+  std::optional<Connection> Connect(const Features& old_place,
+                                    const Rotation& predicted_view_from_old) const {
+    const Matches matches =
+        MatchFeatures(old_place, view_, predicted_view_from_old, camera_, tools_.matching);
+    std::vector<std::array<int, 2>> keypoints;
+    keypoints.reserve(matches.matches.size());
+    for (const Match& match : matches.matches) keypoints.push_back({match.i.value, match.j.value});
+    std::optional<Connection> connection =
+        ConnectByMatches(old_place,
+                         view_,
+                         keypoints,
+                         predicted_view_from_old,
+                         camera_.MeanFocal(),
+                         {tools_.relative_rotation, tools_.seed, tools_.num_threads});
+    if (!connection) return std::nullopt;
+    const int inliers = connection->edge.num_inliers;
+    const double least = options_.min_inlier_ratio * static_cast<double>(keypoints.size());
+    if (inliers < options_.min_inliers || inliers < least) return std::nullopt;
+    if (LargestSigmaDeg(connection->edge.covariance) > options_.max_sigma_deg) return std::nullopt;
+    connection->edge.covariance *= options_.edge_error_factor * options_.edge_error_factor;
+    return connection;
+  }
+
+ private:
+  const Features& view_;
+  const Camera& camera_;
+  const VerificationOptions& options_;
+  const VerificationTools& tools_;
+};
+
+// What one old place says of where the view looks.
+struct Opinion {
+  Connection connection;
+  Rotation view_from_world;
+};
+
+// The opinions within `max_angle_deg` of one of them, that being the one with the most matches in
+// all; positions, it and then the others by their number of matches.
+std::vector<int> LargestAgreement(const std::vector<Opinion>& opinions, double max_angle_deg) {
+  const auto inliers = [&](int index) { return opinions[index].connection.edge.num_inliers; };
+  const int count = static_cast<int>(opinions.size());
+  std::vector<int> largest;
+  int most_inliers = 0;
+  for (int center = 0; center < count; ++center) {
+    std::vector<int> agreeing = {center};
+    int num_inliers = inliers(center);
+    for (int other = 0; other < count; ++other) {
+      const Rotation turn =
+          opinions[other].view_from_world * opinions[center].view_from_world.Inverse();
+      if (other == center || turn.AngleDeg() > max_angle_deg) continue;
+      agreeing.push_back(other);
+      num_inliers += inliers(other);
+    }
+    if (num_inliers <= most_inliers) continue;
+    most_inliers = num_inliers;
+    largest = std::move(agreeing);
+  }
+  return largest;
+}
+
+}  // namespace
+
+std::optional<std::string> VerificationOptions::Problem() const {
+  if (min_inliers < 1) return OutOfRange("min_inliers", min_inliers, "at least 1");
+  if (!(min_inlier_ratio >= 0.0 && min_inlier_ratio < 1.0)) {
+    return OutOfRange("min_inlier_ratio", min_inlier_ratio, "0 or more and below 1");
+  }
+  if (!(max_sigma_deg > 0.0)) return OutOfRange("max_sigma_deg", max_sigma_deg, "above 0");
+  if (!(edge_error_factor > 0.0)) {
+    return OutOfRange("edge_error_factor", edge_error_factor, "above 0");
+  }
+  if (min_edges < 1) return OutOfRange("min_edges", min_edges, "at least 1");
+  if (sure_inliers < 0) return OutOfRange("sure_inliers", sure_inliers, "zero or more");
+  if (!(max_cycle_deg > 0.0)) return OutOfRange("max_cycle_deg", max_cycle_deg, "above 0");
+  if (!(max_drift_deg > 0.0)) return OutOfRange("max_drift_deg", max_drift_deg, "above 0");
+  if (!(max_drift_deg_per_sqrt_frame >= 0.0)) {
+    return OutOfRange("max_drift_deg_per_sqrt_frame", max_drift_deg_per_sqrt_frame, "zero or more");
+  }
+  return std::nullopt;
+}
+
+LoopEvidence VerifyLoop(const Features& view,
+                        std::span<const Features* const> old_places,
+                        const RotationMap& cam_from_world,
+                        int num_consistent,
+                        bool is_way_known,
+                        const Camera& camera,
+                        const VerificationOptions& options,
+                        const VerificationTools& tools) {
+  const Verifier verifier(view, camera, options, tools);
+  const Rotation& present_view_from_world = cam_from_world.at(view.frame);
+  LoopEvidence evidence;
+  evidence.match = old_places.front()->frame;
+  std::vector<Opinion> opinions;
+  for (const Features* old_place : old_places) {
+    const Rotation& old_from_world = cam_from_world.at(old_place->frame);
+    auto edge = verifier.Connect(*old_place, present_view_from_world * old_from_world.Inverse());
+    if (!edge) {
+      // Neighbours are witnesses; where the likeliest place says no, they are not asked.
+      if (opinions.empty()) return evidence;
+      continue;
+    }
+    const Rotation view_from_world = edge->edge.j_from_i * old_from_world;
+    opinions.push_back({*std::move(edge), view_from_world});
+  }
+  const std::vector<int> agreeing = LargestAgreement(opinions, options.max_cycle_deg);
+  const Opinion& best = opinions[agreeing.front()];
+  evidence.match = best.connection.edge.i;
+  evidence.num_inliers = best.connection.edge.num_inliers;
+  evidence.angle_deg = (best.view_from_world * present_view_from_world.Inverse()).AngleDeg();
+  const int num_frames = view.frame.value - evidence.match.value;
+  const double drift_deg = options.max_drift_deg + options.max_drift_deg_per_sqrt_frame *
+                                                       std::sqrt(static_cast<double>(num_frames));
+  int num_inliers = 0;
+  for (const int index : agreeing) num_inliers += opinions[index].connection.edge.num_inliers;
+  evidence.accepted = static_cast<int>(agreeing.size()) >= options.min_edges &&
+                      (num_inliers >= options.sure_inliers || num_consistent > 1) &&
+                      (!is_way_known || evidence.angle_deg <= drift_deg);
+  if (!evidence.accepted) return evidence;
+  for (const int index : agreeing) {
+    evidence.connections.push_back(std::move(opinions[index].connection));
+  }
+  return evidence;
+}
+
+}  // namespace rotslam

@@ -1,0 +1,96 @@
+#pragma once
+
+#include <cstdint>
+#include <optional>
+#include <span>
+#include <string>
+#include <vector>
+
+#include "rotodom/camera/camera.h"
+#include "rotodom/features/features.h"
+#include "rotodom/matching/matching.h"
+#include "rotodom/relative_rotation/relative_rotation.h"
+#include "rotodom/types/maps.h"
+#include "rotodom/view_graph/connect.h"
+
+namespace rotslam {
+
+struct VerificationOptions {
+  // An edge back to an older place needs this many matches that agree, and this share of all that
+  // look alike. Of wrong places' matches chance makes up to a third agree.
+  int min_inliers = 40;
+  double min_inlier_ratio = 0.45;
+  // An edge that is less certain of its rotation than this, one standard deviation of the least
+  // certain axis, tells nothing of drift.
+  double max_sigma_deg = 0.2;
+  // Loop edges are wrong by this many times the deviation that the scatter of their matches shows:
+  // corners described anew lie beside the point by an amount that their neighbours share. On TUM
+  // fr1_rpy the ratio is 2 to 12.
+  double edge_error_factor = 5.0;
+  // Rotations around short cycles, present place - old place - its neighbour, close to this. Two
+  // views of a plane, or with little overlap, have several solutions; over three views only the
+  // right one is the same.
+  double max_cycle_deg = 1.0;
+  // Edges of one place that must agree so.
+  int min_edges = 2;
+  // With fewer matches in all than this, the place before must have led to the same places.
+  int sure_inliers = 200;
+  // Orientations may have drifted by this, and by so much per square root of a frame between the
+  // two places: a loop that contradicts them by more is a wrong place with a similar look.
+  double max_drift_deg = 3.0;
+  double max_drift_deg_per_sqrt_frame = 0.3;
+
+  std::optional<std::string> Problem() const;
+
+  template <class Visitor>
+  void Visit(Visitor&& visit) {
+    visit("min_inliers", min_inliers);
+    visit("min_inlier_ratio", min_inlier_ratio);
+    visit("max_sigma_deg", max_sigma_deg);
+    visit("edge_error_factor", edge_error_factor);
+    visit("max_cycle_deg", max_cycle_deg);
+    visit("min_edges", min_edges);
+    visit("sure_inliers", sure_inliers);
+    visit("max_drift_deg", max_drift_deg);
+    visit("max_drift_deg_per_sqrt_frame", max_drift_deg_per_sqrt_frame);
+  }
+};
+
+/// How a present place was compared with an old one.
+struct LoopEvidence {
+  // The old place that the best edge leads to; the candidate when there is none.
+  FrameId match;
+  int num_inliers = 0;  // of that edge
+  // Of the rotation around the loop: that edge against the present orientations.
+  double angle_deg = 0.0;
+  bool accepted = false;
+  // When accepted: the edges that agree with each other, the best one first.
+  std::vector<Connection> connections;
+};
+
+struct VerificationTools {
+  MatchingOptions matching;
+  RelativeRotationOptions relative_rotation;
+  std::uint64_t seed = 1;
+  int num_threads = 1;
+};
+
+/// Decides by geometry whether `view` sees what `old_places` saw: matches their descriptors and
+/// estimates their relative rotations as the odometry does, and asks whether enough of them are
+/// consistent with one another and with what is known of the way between.
+/// @param view             described features of the present place.
+/// @param old_places       described features; the candidate first, then its neighbours.
+/// @param cam_from_world   present orientations of all of them.
+/// @param num_consistent   as in LoopCandidate.
+/// @param is_way_known     orientations of the two places are linked by edges, so that drift is all
+///                         that can be wrong with them.
+LoopEvidence VerifyLoop(const Features& view,
+                        std::span<const Features* const> old_places,
+                        const RotationMap& cam_from_world,
+                        int num_consistent,
+                        bool is_way_known,
+                        const Camera& camera,
+                        const VerificationOptions& options,
+                        const VerificationTools& tools);
+
+}  // namespace rotslam
