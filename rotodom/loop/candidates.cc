@@ -32,15 +32,17 @@ std::vector<LoopCandidate> CandidateFinder::AddPlace(FrameId frame,
   const std::set<FrameId> covisible(neighbours.begin(), neighbours.end());
   // What a neighbour is alike is what a place must be alike at least.
   double least_score = 1.0;
+  std::size_t num_neighbours_found = 0;
   std::vector<PlaceMatch> matches;
   for (const PlaceMatch& match : database_.Query(bag)) {
     if (covisible.contains(match.frame)) {
       least_score = std::min(least_score, match.score);
+      ++num_neighbours_found;
     } else if (frame.value - match.frame.value > options_.recent_frames) {
       matches.push_back(match);
     }
   }
-  if (covisible.empty()) least_score = 0.0;
+  if (covisible.empty() || num_neighbours_found < covisible.size()) least_score = 0.0;
   matches = WithManyCommonWords(matches, options_.common_words_ratio);
   std::erase_if(matches, [&](const PlaceMatch& match) { return match.score < least_score; });
 

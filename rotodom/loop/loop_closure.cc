@@ -94,7 +94,12 @@ LoopReport LoopClosure::AddFrame(const FrameEstimate& estimate,
                                  const RotationMap& cam_from_world) {
   timestamps_s_[estimate.frame] = estimate.timestamp_s;
   LoopReport report = Finish(cam_from_world);
-  FindPiece(estimate);
+  // A handful of matches may agree by chance: no way that is known.
+  if (!estimate.report.weak) {
+    for (const Connection& connection : estimate.connections) {
+      pieces_.Join(connection.edge.i, estimate.frame);
+    }
+  }
   if (IsNewPlace(estimate)) pending_ = Describe(estimate, image);
   return report;
 }
@@ -116,28 +121,10 @@ LoopReport LoopClosure::Finish(const RotationMap& cam_from_world) {
   }
   for (const Connection& connection : report.connections) {
     finder_.Join(connection.edge.i, frame);
-    JoinPieces(pieces_.at(connection.edge.i), pieces_.at(frame));
+    pieces_.Join(connection.edge.i, frame);
   }
   places_.emplace(frame, std::move(place));
   return report;
-}
-
-void LoopClosure::FindPiece(const FrameEstimate& estimate) {
-  if (estimate.connections.empty()) {
-    pieces_[estimate.frame] = estimate.frame.value;
-    return;
-  }
-  pieces_[estimate.frame] = pieces_.at(estimate.connections.front().edge.i);
-  for (const Connection& connection : estimate.connections) {
-    JoinPieces(pieces_.at(connection.edge.i), pieces_.at(estimate.frame));
-  }
-}
-
-void LoopClosure::JoinPieces(int a, int b) {
-  if (a == b) return;
-  for (auto& [frame, piece] : pieces_) {
-    if (piece == a) piece = b;
-  }
 }
 
 bool LoopClosure::IsNewPlace(const FrameEstimate& estimate) const {
@@ -224,7 +211,7 @@ LoopCheck LoopClosure::Verify(const Place& place,
                                      old_places,
                                      cam_from_world,
                                      candidate.num_consistent,
-                                     pieces_.at(candidate.frame) == pieces_.at(frame),
+                                     pieces_.Of(candidate.frame) == pieces_.Of(frame),
                                      camera_,
                                      options_.verification,
                                      tools_);

@@ -10,6 +10,7 @@
 #include <opencv2/core.hpp>
 
 #include "rotodom/loop/candidates.h"
+#include "rotodom/loop/pieces.h"
 #include "rotodom/loop/verification.h"
 #include "rotodom/loop/vocabulary.h"
 #include "rotodom/odometry.h"
@@ -119,9 +120,6 @@ class LoopClosure {
     std::vector<Eigen::Vector2d> features_px;  // the frame's
   };
 
-  // Pieces of the view-graph, by frame: between two of them no way is known.
-  void FindPiece(const FrameEstimate& estimate);
-  void JoinPieces(int a, int b);
   bool IsNewPlace(const FrameEstimate& estimate) const;
   PendingPlace Describe(const FrameEstimate& estimate, const cv::Mat& image);
   // Moves the corners to where a global shutter would have seen them; false when that is not known
@@ -141,7 +139,7 @@ class LoopClosure {
   std::shared_ptr<const Vocabulary> vocabulary_;
   CandidateFinder finder_;
   std::map<FrameId, Place> places_;
-  std::map<FrameId, int> pieces_;
+  Pieces pieces_;
   std::optional<PendingPlace> pending_;
   std::map<FrameId, double> timestamps_s_;
   LoopSeconds seconds_;

@@ -6,9 +6,29 @@
 
 #include "rotodom/averaging/global_averaging.h"
 #include "rotodom/loop/default_vocabulary.h"
+#include "rotodom/loop/pieces.h"
 #include "rotodom/types/stopwatch.h"
 
 namespace rotslam {
+namespace {
+
+// Without the weak edges whose views are joined by better ones: chance may have made them.
+ViewGraph WithoutWeakCycles(const ViewGraph& graph,
+                            const std::set<std::pair<FrameId, FrameId>>& weak_edges) {
+  ViewGraph strong;
+  Pieces pieces;
+  for (const RelativeRotation& edge : graph.edges()) {
+    if (weak_edges.contains({edge.i, edge.j})) continue;
+    strong.AddEdge(edge);
+    pieces.Join(edge.i, edge.j);
+  }
+  for (const auto& [i, j] : weak_edges) {
+    if (pieces.Join(i, j)) strong.AddEdge(*graph.FindEdge(i, j));
+  }
+  return strong;
+}
+
+}  // namespace
 
 LoopedOdometry::LoopedOdometry(const Camera& camera,
                                const OdometryOptions& odometry,
@@ -31,13 +51,19 @@ LoopedOdometry::LoopedOdometry(const Camera& camera,
 LoopedEstimate LoopedOdometry::AddFrame(FrameId frame, double timestamp_s, const cv::Mat& image) {
   FrameEstimate estimate = odometry_.AddFrame(frame, timestamp_s, image);
   newest_ = {frame, estimate.cam_from_world};
-  for (auto& [view, rotation] : estimate.window) rotation = rotation * odometry_from_world_;
-  estimate.cam_from_world = estimate.cam_from_world * odometry_from_world_;
+  if (odometry_from_world_) {
+    for (auto& [view, rotation] : estimate.window) rotation = rotation * *odometry_from_world_;
+    estimate.cam_from_world = estimate.cam_from_world * *odometry_from_world_;
+  }
 
   LoopedEstimate looped;
   looped.frame = frame;
   looped.covariance = estimate.covariance;
   looped.report = estimate.report;
+  if (estimate.report.weak) {
+    const RelativeRotation& edge = estimate.connections.front().edge;
+    weak_edges_.emplace(edge.i, edge.j);
+  }
   if (closure_) {
     result_.cam_from_world[frame] = estimate.cam_from_world;
     LoopReport loops = closure_->AddFrame(estimate, image, result_.cam_from_world);
@@ -68,7 +94,24 @@ std::vector<LoopCheck> LoopedOdometry::Finish() {
   return loops.checks;
 }
 
+void LoopedOdometry::AlignPieces(const RelativeRotation& loop) {
+  Pieces pieces;
+  for (const RelativeRotation& edge : result_.graph.edges()) {
+    if (!weak_edges_.contains({edge.i, edge.j})) pieces.Join(edge.i, edge.j);
+  }
+  const FrameId newer = pieces.Of(loop.j);
+  if (pieces.Of(loop.i) == newer) return;
+  RotationMap& cam_from_world = result_.cam_from_world;
+  const Rotation old_from_new =
+      cam_from_world.at(loop.j).Inverse() * (loop.j_from_i * cam_from_world.at(loop.i));
+  for (auto& [frame, rotation] : cam_from_world) {
+    if (pieces.Of(frame) == newer) rotation = rotation * old_from_new;
+  }
+}
+
 bool LoopedOdometry::Close(LoopReport& loops) {
+  // The best edge comes first.
+  if (!loops.connections.empty()) AlignPieces(loops.connections.front().edge);
   for (Connection& connection : loops.connections) {
     result_.graph.AddEdge(connection.edge);
     if (keep_features_) result_.edge_matches.push_back(std::move(connection.matches));
@@ -84,8 +127,11 @@ bool LoopedOdometry::Close(LoopReport& loops) {
 
 void LoopedOdometry::AverageAll() {
   const Stopwatch stopwatch(averaging_seconds_);
-  const RotationMap averaged =
-      CloseLoops(result_.graph, result_.cam_from_world, averaging_, num_threads_).cam_from_world;
+  const RotationMap averaged = CloseLoops(WithoutWeakCycles(result_.graph, weak_edges_),
+                                          result_.cam_from_world,
+                                          averaging_,
+                                          num_threads_)
+                                   .cam_from_world;
   for (const auto& [view, rotation] : averaged) result_.cam_from_world[view] = rotation;
   const auto& [newest, cam_from_odometry] = newest_;
   odometry_from_world_ = cam_from_odometry.Inverse() * result_.cam_from_world.at(newest);

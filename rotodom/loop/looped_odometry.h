@@ -3,6 +3,7 @@
 #include <cstdint>
 #include <memory>
 #include <optional>
+#include <set>
 #include <utility>
 #include <vector>
 
@@ -58,6 +59,8 @@ class LoopedOdometry {
   int num_places() const { return closure_ ? closure_->num_places() : 0; }
 
  private:
+  // Turns the newer of two pieces of the view-graph between which no way was known.
+  void AlignPieces(const RelativeRotation& loop);
   // Takes the edges; true when they have moved all orientations.
   bool Close(LoopReport& loops);
   void AverageAll();
@@ -69,9 +72,12 @@ class LoopedOdometry {
   int num_threads_;
   std::optional<LoopClosure> closure_;
   OdometryResult result_;
-  Rotation odometry_from_world_;         // turns the odometry's world into that of the result
+  // Turns the odometry's world into that of the result, once these are two.
+  std::optional<Rotation> odometry_from_world_;
   std::pair<FrameId, Rotation> newest_;  // frame, and its orientation as the odometry has it
-  bool has_new_loops_ = false;           // since the last averaging of all
+  // Edges that a handful of matches speaks for.
+  std::set<std::pair<FrameId, FrameId>> weak_edges_;
+  bool has_new_loops_ = false;  // since the last averaging of all
   double averaging_seconds_ = 0.0;
 };
 

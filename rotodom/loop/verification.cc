@@ -42,7 +42,6 @@ class Verifier {
     const double least = options_.min_inlier_ratio * static_cast<double>(keypoints.size());
     if (inliers < options_.min_inliers || inliers < least) return std::nullopt;
     if (LargestSigmaDeg(connection->edge.covariance) > options_.max_sigma_deg) return std::nullopt;
-    connection->edge.covariance *= options_.edge_error_factor * options_.edge_error_factor;
     return connection;
   }
 
@@ -91,9 +90,6 @@ std::optional<std::string> VerificationOptions::Problem() const {
     return OutOfRange("min_inlier_ratio", min_inlier_ratio, "0 or more and below 1");
   }
   if (!(max_sigma_deg > 0.0)) return OutOfRange("max_sigma_deg", max_sigma_deg, "above 0");
-  if (!(edge_error_factor > 0.0)) {
-    return OutOfRange("edge_error_factor", edge_error_factor, "above 0");
-  }
   if (min_edges < 1) return OutOfRange("min_edges", min_edges, "at least 1");
   if (sure_inliers < 0) return OutOfRange("sure_inliers", sure_inliers, "zero or more");
   if (!(max_cycle_deg > 0.0)) return OutOfRange("max_cycle_deg", max_cycle_deg, "above 0");

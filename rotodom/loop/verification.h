@@ -23,10 +23,6 @@ struct VerificationOptions {
   // An edge that is less certain of its rotation than this, one standard deviation of the least
   // certain axis, tells nothing of drift.
   double max_sigma_deg = 0.2;
-  // Loop edges are wrong by this many times the deviation that the scatter of their matches shows:
-  // corners described anew lie beside the point by an amount that their neighbours share. On TUM
-  // fr1_rpy the ratio is 2 to 12.
-  double edge_error_factor = 5.0;
   // Rotations around short cycles, present place - old place - its neighbour, close to this. Two
   // views of a plane, or with little overlap, have several solutions; over three views only the
   // right one is the same.
@@ -47,7 +43,6 @@ struct VerificationOptions {
     visit("min_inliers", min_inliers);
     visit("min_inlier_ratio", min_inlier_ratio);
     visit("max_sigma_deg", max_sigma_deg);
-    visit("edge_error_factor", edge_error_factor);
     visit("max_cycle_deg", max_cycle_deg);
     visit("min_edges", min_edges);
     visit("sure_inliers", sure_inliers);

@@ -64,6 +64,7 @@ TEST_P(OnBothSequences, WritesItsFilesAndNoOthers) {
   EXPECT_THAT(FileNames(Out()),
               ElementsAre("cloud.ply",
                           "keyframes_tum.txt",
+                          "loops.csv",
                           "rotations.csv",
                           "rotations_tum.txt",
                           "segments.csv",
@@ -238,8 +239,12 @@ TEST_P(OnBothSequences, RotationsStopsAfterTheSameOrientations) {
       Rotslam({"rotations", Sequence().string(), "--out=" + folder.path().string()});
   ASSERT_EQ(result.exit_code, 0) << result.error;
   EXPECT_THAT(FileNames(folder.path()),
-              ElementsAre("rotations.csv", "rotations_tum.txt", "summary.json", "view_graph.g2o"));
-  for (const char* name : {"rotations.csv", "rotations_tum.txt", "view_graph.g2o"}) {
+              ElementsAre("loops.csv",
+                          "rotations.csv",
+                          "rotations_tum.txt",
+                          "summary.json",
+                          "view_graph.g2o"));
+  for (const char* name : {"loops.csv", "rotations.csv", "rotations_tum.txt", "view_graph.g2o"}) {
     EXPECT_EQ(ReadWholeFile(folder.path() / name), ReadWholeFile(Out() / name)) << name;
   }
   EXPECT_EQ(ReadSummary(folder.path())["command"], "rotations");

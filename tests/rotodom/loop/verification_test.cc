@@ -1,0 +1,357 @@
+#include "rotodom/loop/verification.h"
+
+#include <algorithm>
+#include <cmath>
+#include <cstring>
+#include <random>
+#include <utility>
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include "tests/rotodom/loop/random_vocabulary.h"
+#include "tests/scenes/scene.h"
+
+namespace rotslam {
+namespace {
+
+using testing::ElementsAre;
+
+// Four views side by side on a ring around the points: 0 to 2 are old, the last one is seen again
+// a little later. All orientations are true.
+constexpr int kPresent = 3;
+
+Scene RingScene(double outlier_ratio = 0.0) {
+  SceneOptions options;
+  options.num_views = 72;
+  options.num_points = 400;
+  options.noise_px = 0.3;
+  options.outlier_ratio = outlier_ratio;
+  return MakeScene(options);
+}
+
+void AddRow(const BinaryDescriptor& descriptor, cv::Mat& rows) {
+  cv::Mat row(1, 32, CV_8UC1);
+  std::memcpy(row.ptr<std::uint8_t>(), descriptor.data(), 32);
+  rows.push_back(row);
+}
+
+// What a view shows of the scene, each point described as in all other views but for ten bits.
+// @param world  another number, other descriptors.
+Features Describe(const Scene& scene, int view, std::uint64_t world = 1) {
+  const std::vector<BinaryDescriptor> descriptors = RandomDescriptors(400, world);
+  std::mt19937_64 random(100 * world + view);
+  Features features;
+  features.frame = FrameId{view};
+  for (const Track& track : scene.tracks) {
+    for (const Observation& observation : track.observations) {
+      if (observation.frame != FrameId{view}) continue;
+      features.keypoints_px.push_back(observation.keypoint_px);
+      features.bearings.push_back(observation.bearing);
+      features.levels.push_back(0);
+      features.angles_rad.push_back(0.0F);
+      features.tracks.push_back(track.id);
+      AddRow(Noisy(descriptors[track.id.value], 10, random), features.descriptors);
+    }
+  }
+  return features;
+}
+
+// The same look, but every corner is where another one was.
+void ShufflePositions(Features& features, std::uint64_t seed) {
+  std::mt19937_64 random(seed);
+  for (int n = features.size() - 1; n > 0; --n) {
+    const auto other = static_cast<int>(random() % (n + 1));
+    std::swap(features.keypoints_px[n], features.keypoints_px[other]);
+    std::swap(features.bearings[n], features.bearings[other]);
+  }
+}
+
+// The same look, but every corner is up to `reach_px` in x and y from where it was.
+void Displace(Features& features, const Camera& camera, double reach_px, std::uint64_t seed) {
+  SceneRandom random(seed);
+  for (int n = 0; n < features.size(); ++n) {
+    features.keypoints_px[n] +=
+        Eigen::Vector2d(random.Uniform(-reach_px, reach_px), random.Uniform(-reach_px, reach_px));
+    features.bearings[n] = *camera.Unproject(features.keypoints_px[n]);
+  }
+}
+
+// All that VerifyLoop takes; a test changes some of it.
+struct Case {
+  Scene scene;
+  Features view;
+  std::vector<Features> old_places;  // the candidate is place 1
+  RotationMap cam_from_world;
+  int num_consistent = 1;
+  bool is_way_known = true;
+  VerificationOptions options;
+  VerificationTools tools;
+
+  LoopEvidence Verify() const {
+    std::vector<const Features*> places;
+    places.reserve(old_places.size());
+    for (const Features& place : old_places) places.push_back(&place);
+    return VerifyLoop(
+        view, places, cam_from_world, num_consistent, is_way_known, scene.camera, options, tools);
+  }
+
+  void Turn(int frame, double angle_deg) {
+    Rotation& rotation = cam_from_world.at(FrameId{frame});
+    rotation = Rotation::Exp({0.0, angle_deg * kRadFromDeg, 0.0}) * rotation;
+  }
+
+  Features& Place(int frame) {
+    return *std::find_if(old_places.begin(), old_places.end(), [&](const Features& place) {
+      return place.frame == FrameId{frame};
+    });
+  }
+};
+
+Case TruePlace(double outlier_ratio = 0.0) {
+  Case c;
+  c.scene = RingScene(outlier_ratio);
+  c.view = Describe(c.scene, kPresent);
+  for (const int frame : {1, 0, 2}) c.old_places.push_back(Describe(c.scene, frame));
+  c.cam_from_world = c.scene.true_cam_from_world;
+  // Wrong matches are wrong all over the image.
+  c.tools.matching.radius_px = c.tools.matching.wide_radius_px = 2000.0;
+  return c;
+}
+
+std::vector<int> ConnectedFrames(const LoopEvidence& evidence) {
+  std::vector<int> frames;
+  frames.reserve(evidence.connections.size());
+  for (const Connection& connection : evidence.connections) {
+    frames.push_back(connection.edge.i.value);
+  }
+  return frames;
+}
+
+void ExpectRefused(const LoopEvidence& evidence) {
+  EXPECT_FALSE(evidence.accepted);
+  EXPECT_TRUE(evidence.connections.empty());
+}
+
+double ErrorDeg(const Scene& scene, const RelativeRotation& edge) {
+  const Rotation truth =
+      scene.true_cam_from_world.at(edge.j) * scene.true_cam_from_world.at(edge.i).Inverse();
+  return (edge.j_from_i * truth.Inverse()).AngleDeg();
+}
+
+TEST(VerifyLoop, AcceptsATruePlace) {
+  for (const double outlier_ratio : {0.0, 0.2}) {
+    const Case c = TruePlace(outlier_ratio);
+    const LoopEvidence evidence = c.Verify();
+    ASSERT_TRUE(evidence.accepted) << outlier_ratio;
+    EXPECT_LT(evidence.angle_deg, 0.2) << outlier_ratio;
+    // Of 400 points; both views are right about a share of (1 - outlier_ratio)^2.
+    EXPECT_GT(evidence.num_inliers, outlier_ratio > 0.0 ? 220 : 350);
+    EXPECT_THAT(ConnectedFrames(evidence), testing::UnorderedElementsAre(0, 1, 2));
+    EXPECT_EQ(evidence.match, evidence.connections.front().edge.i);
+    EXPECT_EQ(evidence.num_inliers, evidence.connections.front().edge.num_inliers);
+    for (const Connection& connection : evidence.connections) {
+      EXPECT_EQ(connection.edge.j, FrameId{kPresent});
+      EXPECT_LT(ErrorDeg(c.scene, connection.edge), 0.2) << outlier_ratio;
+    }
+  }
+}
+
+TEST(VerifyLoop, GivesTheMatchesThatAgree) {
+  Case c = TruePlace(0.2);
+  const LoopEvidence evidence = c.Verify();
+  ASSERT_TRUE(evidence.accepted);
+  for (const Connection& connection : evidence.connections) {
+    const Features& place = c.Place(connection.edge.i.value);
+    EXPECT_EQ(connection.matches.frame_i, place.frame);
+    EXPECT_EQ(connection.matches.frame_j, c.view.frame);
+    ASSERT_EQ(static_cast<int>(connection.matches.pairs.size()), connection.edge.num_inliers);
+    int num_right = 0;
+    for (const auto& [i, j] : connection.matches.pairs) {
+      num_right += place.tracks[i] == c.view.tracks[j] &&
+                   !c.scene.outliers.contains({place.tracks[i], place.frame}) &&
+                   !c.scene.outliers.contains({c.view.tracks[j], c.view.frame});
+    }
+    // Some wrong ones lie on their epipolar line by chance.
+    EXPECT_GT(num_right, 0.95 * connection.edge.num_inliers);
+    EXPECT_FALSE(connection.outliers_j.empty());
+  }
+}
+
+TEST(VerifyLoop, MeasuresTheDrift) {
+  for (const double drift_deg : {0.0, 1.0, 2.5}) {
+    Case c = TruePlace();
+    c.Turn(kPresent, drift_deg);
+    const LoopEvidence evidence = c.Verify();
+    EXPECT_TRUE(evidence.accepted) << drift_deg;
+    EXPECT_NEAR(evidence.angle_deg, drift_deg, 0.3);
+  }
+}
+
+TEST(VerifyLoop, RefusesOtherDescriptors) {
+  Case c = TruePlace();
+  c.num_consistent = 5;
+  for (Features& place : c.old_places) place = Describe(c.scene, place.frame.value, 2);
+  const LoopEvidence evidence = c.Verify();
+  ExpectRefused(evidence);
+  EXPECT_EQ(evidence.match, FrameId{1});
+  EXPECT_EQ(evidence.num_inliers, 0);
+}
+
+TEST(VerifyLoop, RefusesShuffledPositions) {
+  for (std::uint64_t seed = 1; seed <= 10; ++seed) {
+    Case c = TruePlace();
+    c.num_consistent = 5;
+    for (Features& place : c.old_places) ShufflePositions(place, 10 * seed + place.frame.value);
+    ExpectRefused(c.Verify());
+  }
+}
+
+// Matches are searched for where they are expected, so that wrong ones are not far off either.
+TEST(VerifyLoop, RefusesWhatAgreesByChance) {
+  int most_inliers = 0;
+  for (std::uint64_t seed = 1; seed <= 10; ++seed) {
+    Case c = TruePlace();
+    c.num_consistent = 5;
+    for (Features& place : c.old_places) {
+      Displace(place, c.scene.camera, 10.0, 10 * seed + place.frame.value);
+    }
+    ExpectRefused(c.Verify());
+    // The share of the matches tells it alone, their number does not.
+    c.options.max_sigma_deg = 180.0;
+    ExpectRefused(c.Verify());
+    c.options.min_inlier_ratio = 0.0;
+    most_inliers = std::max(most_inliers, c.Verify().num_inliers);
+  }
+  RecordProperty("most_inliers", most_inliers);
+  EXPECT_GT(most_inliers, VerificationOptions().min_inliers);
+}
+
+TEST(VerifyLoop, AsksNoNeighboursWhereTheCandidateSaysNo) {
+  Case c = TruePlace();
+  c.Place(1) = Describe(c.scene, 1, 2);
+  const LoopEvidence evidence = c.Verify();
+  ExpectRefused(evidence);
+  EXPECT_EQ(evidence.match, FrameId{1});
+  EXPECT_EQ(evidence.num_inliers, 0);
+}
+
+TEST(VerifyLoop, LeavesOutNeighboursThatSeeSomethingElse) {
+  Case c = TruePlace();
+  c.Place(0) = Describe(c.scene, 0, 2);
+  const LoopEvidence evidence = c.Verify();
+  EXPECT_TRUE(evidence.accepted);
+  EXPECT_THAT(ConnectedFrames(evidence), testing::UnorderedElementsAre(1, 2));
+}
+
+TEST(VerifyLoop, WantsAWitness) {
+  Case c = TruePlace();
+  c.num_consistent = 5;
+  c.old_places.resize(1);
+  const LoopEvidence alone = c.Verify();
+  ExpectRefused(alone);
+  EXPECT_GT(alone.num_inliers, 350);
+  EXPECT_EQ(alone.match, FrameId{1});
+  c.options.min_edges = 1;
+  EXPECT_THAT(ConnectedFrames(c.Verify()), ElementsAre(1));
+}
+
+TEST(VerifyLoop, WitnessesMustAgree) {
+  Case c = TruePlace();
+  c.num_consistent = 5;
+  c.Turn(0, 3.0);
+  EXPECT_THAT(ConnectedFrames(c.Verify()), testing::UnorderedElementsAre(1, 2));
+  c.Turn(2, -3.0);
+  ExpectRefused(c.Verify());
+  c.options.max_cycle_deg = 4.0;
+  EXPECT_THAT(ConnectedFrames(c.Verify()), testing::UnorderedElementsAre(0, 1, 2));
+}
+
+TEST(VerifyLoop, NeighboursMayOutvoteTheCandidate) {
+  Case c = TruePlace();
+  c.Turn(1, 3.0);
+  const LoopEvidence evidence = c.Verify();
+  EXPECT_THAT(ConnectedFrames(evidence), testing::UnorderedElementsAre(0, 2));
+  EXPECT_NE(evidence.match, FrameId{1});
+  EXPECT_LT(evidence.angle_deg, 0.3);
+}
+
+TEST(VerifyLoop, FewMatchesMustBeConsistent) {
+  Case c = TruePlace();
+  // More than one edge has, less than all three have.
+  c.options.sure_inliers = 600;
+  EXPECT_TRUE(c.Verify().accepted);
+  c.options.sure_inliers = 100000;
+  ExpectRefused(c.Verify());
+  c.num_consistent = 2;
+  EXPECT_TRUE(c.Verify().accepted);
+}
+
+TEST(VerifyLoop, WantsEnoughMatchesThatAgree) {
+  Case c = TruePlace(0.2);
+  ASSERT_TRUE(c.Verify().accepted);
+  c.options.min_inliers = 380;
+  ExpectRefused(c.Verify());
+  c.options = {};
+  c.options.min_inlier_ratio = 0.95;
+  ExpectRefused(c.Verify());
+}
+
+TEST(VerifyLoop, DriftIsBoundedWhereTheWayIsKnown) {
+  Case c = TruePlace();
+  c.options.max_drift_deg = 2.0;
+  c.options.max_drift_deg_per_sqrt_frame = 0.0;
+  c.Turn(kPresent, 4.0);
+  const LoopEvidence known = c.Verify();
+  ExpectRefused(known);
+  EXPECT_NEAR(known.angle_deg, 4.0, 0.3);
+  EXPECT_GT(known.num_inliers, 350);
+  c.is_way_known = false;
+  EXPECT_TRUE(c.Verify().accepted);
+}
+
+TEST(VerifyLoop, DriftMayGrowWithTheWay) {
+  for (const auto& [frame, is_accepted] : {std::pair(20, false), std::pair(900, true)}) {
+    Case c = TruePlace();
+    c.options.max_drift_deg = 2.0;
+    c.options.max_drift_deg_per_sqrt_frame = 0.1;
+    c.Turn(kPresent, 4.0);
+    c.view.frame = FrameId{frame};
+    c.cam_from_world[c.view.frame] = c.cam_from_world.at(FrameId{kPresent});
+    EXPECT_EQ(c.Verify().accepted, is_accepted) << frame;
+  }
+}
+
+TEST(VerifyLoop, RefusesUncertainEdges) {
+  Case c = TruePlace();
+  const LoopEvidence evidence = c.Verify();
+  ASSERT_TRUE(evidence.accepted);
+  c.options.max_sigma_deg = 1e-4;
+  ExpectRefused(c.Verify());
+}
+
+TEST(VerificationOptions, NamesTheFirstFieldOutOfRange) {
+  EXPECT_FALSE(VerificationOptions{}.Problem());
+  const auto problem = [](auto change) {
+    VerificationOptions options;
+    change(options);
+    return options.Problem().value_or("none");
+  };
+  using Options = VerificationOptions&;
+  EXPECT_TRUE(problem([](Options o) { o.min_inliers = 0; }).starts_with("min_inliers is 0"));
+  EXPECT_TRUE(
+      problem([](Options o) { o.min_inlier_ratio = 1.0; }).starts_with("min_inlier_ratio is 1"));
+  EXPECT_TRUE(problem([](Options o) { o.max_sigma_deg = 0.0; }).starts_with("max_sigma_deg is 0"));
+  EXPECT_TRUE(
+      problem([](Options o) { o.max_cycle_deg = -1.0; }).starts_with("max_cycle_deg is -1"));
+  EXPECT_TRUE(problem([](Options o) { o.min_edges = 0; }).starts_with("min_edges is 0"));
+  EXPECT_TRUE(problem([](Options o) { o.sure_inliers = -1; }).starts_with("sure_inliers is -1"));
+  EXPECT_TRUE(
+      problem([](Options o) { o.max_drift_deg = std::nan(""); }).starts_with("max_drift_deg is "));
+  EXPECT_TRUE(problem([](Options o) {
+                o.max_drift_deg_per_sqrt_frame = -0.1;
+              }).starts_with("max_drift_deg_per_sqrt_frame is -0.1"));
+}
+
+}  // namespace
+}  // namespace rotslam
