@@ -13,7 +13,7 @@
 namespace rotslam {
 
 struct CandidateOptions {
-  // A frame is no loop of the ones that came less than this many frames before it.
+  // A frame is no loop of the ones that came up to this many frames before it.
   int recent_frames = 10;
   // Only places with more than this part of the most common words are looked at.
   double common_words_ratio = 0.8;

@@ -1,5 +1,6 @@
 #include "rotodom/loop/verification.h"
 
+#include <algorithm>
 #include <cmath>
 
 #include <Eigen/Eigenvalues>
@@ -58,8 +59,8 @@ struct Opinion {
   Rotation view_from_world;
 };
 
-// The opinions within `max_angle_deg` of one of them, that being the one with the most matches in
-// all; positions, it and then the others by their number of matches.
+// The opinions within `max_angle_deg` of one of them, that being the one around which most matches
+// agree; positions, those with most matches first.
 std::vector<int> LargestAgreement(const std::vector<Opinion>& opinions, double max_angle_deg) {
   const auto inliers = [&](int index) { return opinions[index].connection.edge.num_inliers; };
   const int count = static_cast<int>(opinions.size());
@@ -79,6 +80,8 @@ std::vector<int> LargestAgreement(const std::vector<Opinion>& opinions, double m
     most_inliers = num_inliers;
     largest = std::move(agreeing);
   }
+  std::stable_sort(
+      largest.begin(), largest.end(), [&](int a, int b) { return inliers(a) > inliers(b); });
   return largest;
 }
 

@@ -74,7 +74,7 @@ struct VerificationTools {
 /// estimates their relative rotations as the odometry does, and asks whether enough of them are
 /// consistent with one another and with what is known of the way between.
 /// @param view             described features of the present place.
-/// @param old_places       described features; the candidate first, then its neighbours.
+/// @param old_places       described features; the candidate first, then its neighbours, if any.
 /// @param cam_from_world   present orientations of all of them.
 /// @param num_consistent   as in LoopCandidate.
 /// @param is_way_known     orientations of the two places are linked by edges, so that drift is all

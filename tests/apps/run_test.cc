@@ -151,7 +151,8 @@ TEST_P(OnBothSequences, SummarySaysWhatWasDone) {
                           "rotodom",
                           "krot",
                           "ba",
-                          "segments"));
+                          "segments",
+                          "loops"));
   for (const auto& [key, value] : summary.items()) {
     if (key != "options") ExpectFinite(value, key);  // an option may be infinite
   }
@@ -238,12 +239,10 @@ TEST_P(OnBothSequences, RotationsStopsAfterTheSameOrientations) {
   const CommandResult result =
       Rotslam({"rotations", Sequence().string(), "--out=" + folder.path().string()});
   ASSERT_EQ(result.exit_code, 0) << result.error;
-  EXPECT_THAT(FileNames(folder.path()),
-              ElementsAre("loops.csv",
-                          "rotations.csv",
-                          "rotations_tum.txt",
-                          "summary.json",
-                          "view_graph.g2o"));
+  EXPECT_THAT(
+      FileNames(folder.path()),
+      ElementsAre(
+          "loops.csv", "rotations.csv", "rotations_tum.txt", "summary.json", "view_graph.g2o"));
   for (const char* name : {"loops.csv", "rotations.csv", "rotations_tum.txt", "view_graph.g2o"}) {
     EXPECT_EQ(ReadWholeFile(folder.path() / name), ReadWholeFile(Out() / name)) << name;
   }
