@@ -52,6 +52,9 @@ LoopedEstimate LoopedOdometry::AddFrame(FrameId frame, double timestamp_s, const
   FrameEstimate estimate = odometry_.AddFrame(frame, timestamp_s, image);
   newest_ = {frame, estimate.cam_from_world};
   if (odometry_from_world_) {
+    // What was averaged with all others the odometry knows less of.
+    std::erase_if(estimate.window,
+                  [&](const auto& entry) { return entry.first <= last_averaged_; });
     for (auto& [view, rotation] : estimate.window) rotation = rotation * *odometry_from_world_;
     estimate.cam_from_world = estimate.cam_from_world * *odometry_from_world_;
   }
@@ -81,7 +84,7 @@ std::vector<LoopCheck> LoopedOdometry::Finish() {
   LoopReport loops;
   if (closure_) loops = closure_->Finish(result_.cam_from_world);
   Close(loops);
-  if (has_new_loops_) AverageAll();
+  if (has_loops_) AverageAll();
   // Orientations still in the window have not been said to be settled.
   int count = 0;
   for (auto entry = result_.cam_from_world.rbegin();
@@ -116,7 +119,7 @@ bool LoopedOdometry::Close(LoopReport& loops) {
     result_.graph.AddEdge(connection.edge);
     if (keep_features_) result_.edge_matches.push_back(std::move(connection.matches));
   }
-  has_new_loops_ = has_new_loops_ || !loops.connections.empty();
+  has_loops_ = has_loops_ || !loops.connections.empty();
   const bool is_large =
       std::any_of(loops.checks.begin(), loops.checks.end(), [&](const LoopCheck& check) {
         return check.accepted && check.angle_deg >= min_correction_deg_;
@@ -135,7 +138,7 @@ void LoopedOdometry::AverageAll() {
   for (const auto& [view, rotation] : averaged) result_.cam_from_world[view] = rotation;
   const auto& [newest, cam_from_odometry] = newest_;
   odometry_from_world_ = cam_from_odometry.Inverse() * result_.cam_from_world.at(newest);
-  has_new_loops_ = false;
+  last_averaged_ = newest;
 }
 
 }  // namespace rotslam

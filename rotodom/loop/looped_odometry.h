@@ -45,8 +45,8 @@ class LoopedOdometry {
   /// Takes the next frame, as RotationalOdometry::AddFrame.
   LoopedEstimate AddFrame(FrameId frame, double timestamp_s, const cv::Mat& image);
 
-  /// To be called after the last frame: averages once more when loops have come since the last
-  /// time, and completes the covariances. What the last frame looked like.
+  /// To be called after the last frame: averages once more when there were loops, and completes
+  /// the covariances. What the last frame looked like.
   std::vector<LoopCheck> Finish();
 
   /// All frames so far.
@@ -77,7 +77,8 @@ class LoopedOdometry {
   std::pair<FrameId, Rotation> newest_;  // frame, and its orientation as the odometry has it
   // Edges that a handful of matches speaks for.
   std::set<std::pair<FrameId, FrameId>> weak_edges_;
-  bool has_new_loops_ = false;  // since the last averaging of all
+  bool has_loops_ = false;
+  FrameId last_averaged_;  // newest frame when all were averaged
   double averaging_seconds_ = 0.0;
 };
 
