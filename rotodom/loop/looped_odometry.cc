@@ -102,13 +102,16 @@ void LoopedOdometry::AlignPieces(const RelativeRotation& loop) {
   for (const RelativeRotation& edge : result_.graph.edges()) {
     if (!weak_edges_.contains({edge.i, edge.j})) pieces.Join(edge.i, edge.j);
   }
-  const FrameId newer = pieces.Of(loop.j);
-  if (pieces.Of(loop.i) == newer) return;
+  const FrameId piece_i = pieces.Of(loop.i);
+  const FrameId piece_j = pieces.Of(loop.j);
+  if (piece_i == piece_j) return;
+  // The piece that began later is turned: the world stays that of the first frame.
   RotationMap& cam_from_world = result_.cam_from_world;
-  const Rotation old_from_new =
+  const Rotation world_j_from_i =
       cam_from_world.at(loop.j).Inverse() * (loop.j_from_i * cam_from_world.at(loop.i));
+  const Rotation turn = piece_i < piece_j ? world_j_from_i : world_j_from_i.Inverse();
   for (auto& [frame, rotation] : cam_from_world) {
-    if (pieces.Of(frame) == newer) rotation = rotation * old_from_new;
+    if (pieces.Of(frame) == std::max(piece_i, piece_j)) rotation = rotation * turn;
   }
 }
 
