@@ -23,6 +23,13 @@ Eigen::Map<const Row, Eigen::Unaligned> RowAt(const float* values) {
   return Eigen::Map<const Row, Eigen::Unaligned>(values);
 }
 
+// One where a row holds a pixel, zero in the padding.
+Row InsidePatch() {
+  Row mask = Row::Ones();
+  mask[kRow - 1] = 0.0F;
+  return mask;
+}
+
 // The pixels that a patch centred near one place can touch, as floating point.
 template <int Side>
 class Window {
@@ -155,8 +162,7 @@ std::optional<PatchTemplate> PatchTemplate::Sample(const cv::Mat& image,
   Row sum = Row::Zero();
   Row sum_x = Row::Zero();
   Row sum_y = Row::Zero();
-  Row mask = Row::Ones();
-  mask[kRow - 1] = 0.0F;
+  const Row mask = InsidePatch();
   for (int row = 0; row < kPatchSide; ++row) {
     const float* middle = sampled.data() + (row + 1) * kSampledStride;
     const Row values = mask * RowAt(middle + 1);
@@ -191,6 +197,8 @@ std::optional<PatchTemplate> PatchTemplate::Sample(const cv::Mat& image,
   if (!(patch.energy_ > kNumPixels * kMinGradientEnergy)) return std::nullopt;
   const float share_x = along_x.sum() / patch.energy_;
   const float share_y = along_y.sum() / patch.energy_;
+  patch.mean_gradient_ = {mean_x, mean_y};
+  patch.gradient_share_ = {share_x, share_y};
   Row xx = Row::Zero();
   Row xy = Row::Zero();
   Row yy = Row::Zero();
@@ -291,6 +299,125 @@ struct PatchAligner {
             .cast<double>();
     return alignment;
   }
+
+  // How a patch's values change with a shift by one pixel in x and in y, a stretch by one, and a
+  // shear by one along the flow that grows with x and with y.
+  static constexpr int kNumModes = 5;
+  using ModeVector = Eigen::Matrix<float, kNumModes, 1>;
+  using ModeMatrix = Eigen::Matrix<float, kNumModes, kNumModes>;
+
+  // Normal equations for how far the image has moved in each mode, with offset and gain taken out.
+  struct ModeEquations {
+    ModeMatrix products;
+    ModeVector b;
+    float residual = 0.0F;  // sum of squares in the patch's grey levels
+    float noise_left = 1.0F;
+  };
+
+  static std::optional<ModeEquations> FormModeEquations(const PatchTemplate& patch,
+                                                        const cv::Mat& image,
+                                                        const Eigen::Vector2f& center,
+                                                        const Eigen::Vector2f& along) {
+    const float left = center.x() - static_cast<float>(kHalf);
+    const float top = center.y() - static_cast<float>(kHalf);
+    const int x = static_cast<int>(std::floor(left));
+    const int y = static_cast<int>(std::floor(top));
+    Window<kPatchSide + 1> window;
+    if (!window.Load(image, x, y)) return std::nullopt;
+    const Bilinear weights(left - static_cast<float>(x), top - static_cast<float>(y));
+
+    const Row mask = InsidePatch();
+    const Row dx = Row::LinSpaced(-kHalf, kRow - 1 - kHalf);
+    std::array<Row, kNumModes> modes;
+    std::array<Row, kNumModes> sums;
+    std::array<Row, kNumModes> shares;
+    std::array<Row, kNumModes> b;
+    std::array<Row, kNumModes*(kNumModes + 1) / 2> products;
+    for (auto* rows : {&sums, &shares, &b}) rows->fill(Row::Zero());
+    products.fill(Row::Zero());
+    Row image_sum = Row::Zero();
+    Row image_share = Row::Zero();
+    Row image_squares = Row::Zero();
+    for (int row = 0; row < kPatchSide; ++row) {
+      const float* above = window.row(row);
+      const float* below = window.row(row + 1);
+      const Row image_values = mask * (weights.w00 * RowAt(above) + weights.w10 * RowAt(above + 1) +
+                                       weights.w01 * RowAt(below) + weights.w11 * RowAt(below + 1));
+      const Row values = RowAt(patch.values_.data() + row * kRow);
+      const Row gradient_x = RowAt(patch.gradient_x_.data() + row * kRow) +
+                             mask * patch.mean_gradient_.x() + patch.gradient_share_.x() * values;
+      const Row gradient_y = RowAt(patch.gradient_y_.data() + row * kRow) +
+                             mask * patch.mean_gradient_.y() + patch.gradient_share_.y() * values;
+      const Row gradient_along = along.x() * gradient_x + along.y() * gradient_y;
+      const float dy = static_cast<float>(row - kHalf);
+      modes = {gradient_x,
+               gradient_y,
+               dx * gradient_x + dy * gradient_y,
+               dx * gradient_along,
+               dy * gradient_along};
+      image_sum += image_values;
+      image_share += image_values * values;
+      image_squares += image_values.square();
+      int n = 0;
+      for (int k = 0; k < kNumModes; ++k) {
+        sums[k] += modes[k];
+        shares[k] += modes[k] * values;
+        b[k] += modes[k] * image_values;
+        for (int l = 0; l <= k; ++l) products[n++] += modes[k] * modes[l];
+      }
+    }
+
+    const float mean = image_sum.sum() / kNumPixels;
+    const float gain = image_share.sum() / patch.energy_;
+    if (!(gain > 0.0F)) return std::nullopt;
+    ModeEquations equations;
+    ModeVector sum;
+    ModeVector share;
+    int n = 0;
+    for (int k = 0; k < kNumModes; ++k) {
+      sum[k] = sums[k].sum();
+      share[k] = shares[k].sum() / patch.energy_;
+      for (int l = 0; l <= k; ++l) {
+        equations.products(k, l) = equations.products(l, k) = products[n++].sum() -
+                                                              sum[k] * sum[l] / kNumPixels -
+                                                              share[k] * share[l] * patch.energy_;
+      }
+      equations.b[k] = share[k] * patch.energy_ + (sum[k] * mean - b[k].sum()) / gain;
+    }
+    equations.residual = std::max(
+        0.0F, (image_squares.sum() - mean * mean * kNumPixels) / (gain * gain) - patch.energy_);
+    equations.noise_left = 0.5F * (patch.noise_left_ + weights.NoiseLeft());
+    return equations;
+  }
+
+  static std::optional<PatchAlignment> Correct(const PatchTemplate& patch,
+                                               const cv::Mat& image,
+                                               const PatchAlignment& found,
+                                               const PatchParallax& parallax) {
+    const float flow_px = static_cast<float>(parallax.flow_px.norm());
+    if (!(flow_px > 0.0F)) return found;
+    const auto equations = FormModeEquations(
+        patch, image, found.center_px.cast<float>(), parallax.flow_px.cast<float>() / flow_px);
+    if (!equations) return std::nullopt;
+    const float variance =
+        equations->residual / (static_cast<float>(kNumPixels - 4) * equations->noise_left);
+    const float sigma = static_cast<float>(parallax.sigma);
+    ModeMatrix information = equations->products;
+    information.diagonal().tail<3>().array() += variance / (sigma * sigma);
+    const ModeMatrix inverse = information.inverse();
+    const ModeVector motion = inverse * equations->b;
+
+    // A point d from the centre is bent by stretch * (shear . d) / flow * d; the shift that fits
+    // best has the mean of that.
+    constexpr float kSecondMoment = (kPatchSide * kPatchSide - 1) / 12.0F;
+    const Eigen::Vector2f stretch_times_shear =
+        motion[2] * motion.tail<2>() + variance * inverse.block<2, 1>(3, 2);
+    const Eigen::Vector2f shift = motion.head<2>() - kSecondMoment / flow_px * stretch_times_shear;
+    PatchAlignment corrected = found;
+    corrected.center_px += shift.cast<double>();
+    corrected.covariance = (variance * inverse.topLeftCorner<2, 2>()).cast<double>();
+    return corrected;
+  }
 };
 
 std::optional<PatchAlignment> AlignPatch(const PatchTemplate& patch,
@@ -298,6 +425,13 @@ std::optional<PatchAlignment> AlignPatch(const PatchTemplate& patch,
                                          const Eigen::Vector2d& start_px,
                                          double max_step_px) {
   return PatchAligner::Align(patch, image, start_px.cast<float>(), static_cast<float>(max_step_px));
+}
+
+std::optional<PatchAlignment> CorrectForParallax(const PatchTemplate& patch,
+                                                 const cv::Mat& image,
+                                                 const PatchAlignment& found,
+                                                 const PatchParallax& parallax) {
+  return PatchAligner::Correct(patch, image, found, parallax);
 }
 
 }  // namespace rotslam

@@ -39,6 +39,9 @@ class PatchTemplate {
   float energy_ = 0.0F;      // sum of squared values
   float noise_left_ = 1.0F;  // share of the image noise's variance that sampling has left
   Eigen::Matrix2f inverse_hessian_;
+  // What is taken out of the gradients: a constant, and this share of the values.
+  Eigen::Vector2f mean_gradient_;
+  Eigen::Vector2f gradient_share_;
 };
 
 /// Where a patch was found.
@@ -57,5 +60,29 @@ std::optional<PatchAlignment> AlignPatch(const PatchTemplate& patch,
                                          const cv::Mat& image,
                                          const Eigen::Vector2d& start_px,
                                          double max_step_px);
+
+/// What a translation of the camera does to a patch.
+struct PatchParallax {
+  Eigen::Vector2d flow_px;  // its motion beside that of a turn
+  // Standard deviation of its stretch and shear, before they are measured.
+  double sigma = 0.0;
+};
+
+/// Moves `found` from where the patch as a whole fits best to where its centre is.
+///
+/// Parallax stretches a patch, shears it along the flow where its depth varies, and bends it. The
+/// half with more structure then counts for more; on ground that runs under the camera it is the
+/// nearer half for nearly all patches, and the hundredths of a pixel that they have in common are
+/// taken for a turn. Stretch and shear are measured; the bend of a plane follows from them.
+/// @return  nullopt where the patch leaves the image or shows something else there.
+/// Error:   on ground that comes nearer, 0.06 px common to all patches become 0.01 px (patch
+///          alignment tests).
+/// Cost:    about 0.5 us.
+/// Source:  flow of a plane, Longuet-Higgins & Prazdny, The Interpretation of a Moving Retinal
+///          Image, Proc. R. Soc. B 1980.
+std::optional<PatchAlignment> CorrectForParallax(const PatchTemplate& patch,
+                                                 const cv::Mat& image,
+                                                 const PatchAlignment& found,
+                                                 const PatchParallax& parallax);
 
 }  // namespace rotslam

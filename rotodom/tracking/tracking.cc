@@ -21,6 +21,11 @@ constexpr double kFineReachPx = 3.0;
 constexpr double kSamePointPx = 1.0;
 // Smaller turns leave a patch as it is.
 constexpr double kTurnThatShowsDeg = 1.0;
+// Less flow beside the turn leaves it so, too.
+constexpr double kFlowThatShowsPx = 0.5;
+// Distance from the epipole, in focal lengths, of a point whose patch is stretched and sheared as
+// much as is usual: by flow over distance.
+constexpr double kDepthScale = 0.15;
 constexpr int kPatchBorderPx = 6;
 
 struct Candidate {
@@ -94,17 +99,10 @@ class Search {
   // Where the point should show; nullopt outside the image.
   std::optional<Eigen::Vector2d> Expect(const Candidate& candidate) const {
     const View& view = *views_[candidate.view].view;
-    const Eigen::Vector3d bearing =
-        target_from_view_[candidate.view] * view.features.bearings[candidate.index];
-    std::optional<Eigen::Vector2d> px = camera_.Project(bearing);
+    std::optional<Eigen::Vector2d> px = Turn(candidate.view, candidate.index);
     if (!px) return std::nullopt;
     double ahead_s = target_.timestamp_s - view.timestamp_s;
-    if (camera_.readout_s > 0.0) {
-      const double late_s = camera_.RowTime(px->y());
-      px = camera_.Project(Rotation::Exp(late_s * target_.rate) * bearing);
-      if (!px) return std::nullopt;
-      ahead_s += late_s;
-    }
+    if (camera_.readout_s > 0.0) ahead_s += camera_.RowTime(px->y());
     const Eigen::Vector2d flow = target_.flow
                                      ? target_.flow->At(view.features.keypoints_px[candidate.index])
                                      : view.flow_px_per_s[candidate.index];
@@ -155,6 +153,35 @@ class Search {
            px.x() < image.cols - 1 - kPatchBorderPx && px.y() < image.rows - 1 - kPatchBorderPx;
   }
 
+  // Where the turn alone would show a point of one of the views, exposed with the row that shows
+  // it; nullopt: the row where it would show without a rolling shutter.
+  std::optional<Eigen::Vector2d> Turn(int view_index,
+                                      int index,
+                                      std::optional<double> row_px = std::nullopt) const {
+    const Eigen::Vector3d bearing =
+        target_from_view_[view_index] * views_[view_index].view->features.bearings[index];
+    std::optional<Eigen::Vector2d> px = camera_.Project(bearing);
+    if (!px || camera_.readout_s == 0.0) return px;
+    const double late_s = camera_.RowTime(row_px.value_or(px->y()));
+    return camera_.Project(Rotation::Exp(late_s * target_.rate) * bearing);
+  }
+
+  // What is left of the flow when the turn is taken out bends the patch, too.
+  PatchAlignment Unbend(const PatchTemplate& patch,
+                        int view_index,
+                        int index,
+                        const PatchAlignment& found) const {
+    const auto turned_px = Turn(view_index, index, found.center_px.y());
+    if (!turned_px) return found;
+    const Eigen::Vector2d flow_px = found.center_px - *turned_px;
+    if (flow_px.norm() < kFlowThatShowsPx) return found;
+    const PatchParallax parallax{flow_px, flow_px.norm() / (kDepthScale * camera_.MeanFocal())};
+    const auto corrected =
+        CorrectForParallax(patch, target_.pyramid->levels.front(), found, parallax);
+    if (!corrected || (corrected->center_px - found.center_px).norm() > kSamePointPx) return found;
+    return *corrected;
+  }
+
   std::optional<Location> Align(
       int view_index, int index, int level, const Eigen::Vector2d& px, double reach_px) const {
     const View& view = *views_[view_index].view;
@@ -167,9 +194,10 @@ class Search {
                               view.pyramid.ToLevel(view.features.keypoints_px[index], level),
                               warp);
     if (!patch) return std::nullopt;
-    const auto found = AlignPatch(
+    auto found = AlignPatch(
         *patch, target_.pyramid->levels[level], target_.pyramid->ToLevel(px, level), reach_px);
     if (!found || found->correlation < options_.min_correlation) return std::nullopt;
+    if (level == 0) found = Unbend(*patch, view_index, index, *found);
     const Eigen::Matrix2d scale = target_.pyramid->scales[level].asDiagonal();
     return Location{target_.pyramid->ToImage(found->center_px, level),
                     scale * found->covariance * scale};

@@ -352,5 +352,157 @@ TEST(AlignPatch, SaysNothingAboutABlankImage) {
   EXPECT_FALSE(found && found->correlation > 0.7);
 }
 
+// Level ground under a camera that looks ahead; what it shows is as fine near as it is far away.
+class Ground {
+ public:
+  static constexpr double kFocal = 300.0;
+  static constexpr double kHorizonRow = 20.0;
+  static constexpr double kHeight_m = 1.65;
+
+  Ground() {
+    SceneRandom random(11);
+    for (int k = 0; k < 60; ++k) {
+      const double wavelength_m = std::exp(random.Uniform(std::log(0.05), std::log(3.0)));
+      const double direction = random.Uniform(0.0, 2.0 * std::numbers::pi);
+      waves_.push_back({2.0 * std::numbers::pi / wavelength_m *
+                            Eigen::Vector2d(std::cos(direction), std::sin(direction)),
+                        random.Uniform(0.0, 2.0 * std::numbers::pi)});
+    }
+  }
+
+  static double Depth(double row) { return kFocal * kHeight_m / (row - kHorizonRow); }
+
+  static Eigen::Vector2d MoveAhead(const Eigen::Vector2d& px, double way_m) {
+    const double scale = Depth(px.y()) / (Depth(px.y()) - way_m);
+    return {Middle() + scale * (px.x() - Middle()), kHorizonRow + scale * (px.y() - kHorizonRow)};
+  }
+
+  // From `way_m` further ahead.
+  cv::Mat Draw(double way_m, std::uint64_t seed) const {
+    SceneRandom random(seed * 1'000'003);
+    cv::Mat image(kSize, kSize, CV_8U);
+    for (int row = 0; row < kSize; ++row) {
+      for (int column = 0; column < kSize; ++column) {
+        const double grey = row < kHorizonRow + 8 ? 128.0 : Shade(row, column, way_m);
+        image.at<std::uint8_t>(row, column) =
+            static_cast<std::uint8_t>(std::clamp(std::lround(grey + random.Normal(2.0)), 0L, 255L));
+      }
+    }
+    return image;
+  }
+
+ private:
+  static double Middle() { return 0.5 * kSize; }
+
+  // Mean over the pixel, without waves too fine for it.
+  double Shade(int row, int column, double way_m) const {
+    constexpr int kSamples = 3;
+    double sum = 0.0;
+    for (int k = 0; k < kSamples * kSamples; ++k) {
+      const double y = row + (k / kSamples + 0.5) / kSamples - 0.5;
+      const double x = column + (k % kSamples + 0.5) / kSamples - 0.5;
+      const double z = Depth(y);
+      const Eigen::Vector2d place_m((x - Middle()) / kFocal * z, z + way_m);
+      for (const auto& [wave, phase] : waves_) {
+        if (wave.norm() * z / kFocal < 2.0) sum += std::sin(wave.dot(place_m) + phase);
+      }
+    }
+    return 128.0 + 9.0 * sum / (kSamples * kSamples);
+  }
+
+  struct Wave {
+    Eigen::Vector2d wave;  // per metre
+    double phase;
+  };
+  std::vector<Wave> waves_;
+};
+
+struct GroundOutcome {
+  int count = 0;
+  double mean_y_px = 0.0;
+  double rms_px = 0.0;
+};
+
+TEST(CorrectForParallax, TakesOutWhatGroundAddsToAllPatches) {
+  constexpr double kWay_m = 0.8;
+  const Ground ground;
+  const cv::Mat first = ground.Draw(0.0, 1);
+  const cv::Mat second = ground.Draw(kWay_m, 2);
+  GroundOutcome plain;
+  GroundOutcome corrected;
+  const auto add = [](const Eigen::Vector2d& error_px, GroundOutcome& outcome) {
+    ++outcome.count;
+    outcome.mean_y_px += error_px.y();
+    outcome.rms_px += error_px.squaredNorm();
+  };
+  SceneRandom random(3);
+  for (int k = 0; k < 4000; ++k) {
+    const Eigen::Vector2d place(random.Uniform(20.0, 220.0), random.Uniform(40.0, 65.0));
+    const Eigen::Vector2d truth_px = Ground::MoveAhead(place, kWay_m);
+    const auto patch = PatchTemplate::Sample(first, place, Eigen::Matrix2d::Identity());
+    if (!patch) continue;
+    const auto found = AlignPatch(*patch, second, truth_px, kReachPx);
+    if (!found || found->correlation < 0.8) continue;
+    const Eigen::Vector2d flow_px = found->center_px - place;
+    const auto better = CorrectForParallax(
+        *patch, second, *found, {flow_px, flow_px.norm() / (0.15 * Ground::kFocal)});
+    ASSERT_TRUE(better);
+    add(found->center_px - truth_px, plain);
+    add(better->center_px - truth_px, corrected);
+  }
+  for (GroundOutcome* outcome : {&plain, &corrected}) {
+    outcome->mean_y_px /= outcome->count;
+    outcome->rms_px = std::sqrt(outcome->rms_px / (2.0 * outcome->count));
+    RecordProperty(outcome == &plain ? "plain" : "corrected",
+                   std::to_string(outcome->count) + " patches, mean " +
+                       std::to_string(outcome->mean_y_px) + " px, rms " +
+                       std::to_string(outcome->rms_px) + " px");
+  }
+  EXPECT_GT(plain.count, 1000);
+  EXPECT_GT(plain.mean_y_px, 0.02);
+  EXPECT_LT(std::abs(corrected.mean_y_px), 0.35 * plain.mean_y_px);
+  EXPECT_LT(corrected.rms_px, 0.8 * plain.rms_px);
+}
+
+TEST(CorrectForParallax, LeavesAPatchThatOnlyMoves) {
+  Appearance moved;
+  moved.shift_px = {2.3, -1.4};
+  Appearance noisy = moved;
+  noisy.noise = 2.0;
+  const cv::Mat first = Draw({});
+  const cv::Mat second = Draw(noisy);
+  double plain = 0.0;
+  double corrected = 0.0;
+  double mahalanobis = 0.0;
+  int count = 0;
+  for (const Eigen::Vector2d& place : Places()) {
+    const auto patch = PatchTemplate::Sample(first, place, Eigen::Matrix2d::Identity());
+    if (!patch) continue;
+    const Eigen::Vector2d truth_px = moved.Move(place);
+    const auto found = AlignPatch(*patch, second, truth_px, kReachPx);
+    if (!found) continue;
+    const auto same = CorrectForParallax(*patch, second, *found, {moved.shift_px, 0.05});
+    ASSERT_TRUE(same);
+    const Eigen::Vector2d error_px = same->center_px - truth_px;
+    plain += (found->center_px - truth_px).squaredNorm();
+    corrected += error_px.squaredNorm();
+    mahalanobis += error_px.dot(same->covariance.inverse() * error_px);
+    ++count;
+  }
+  ASSERT_GT(count, 150);
+  EXPECT_LT(std::sqrt(corrected / plain), 1.3);
+  EXPECT_LT(mahalanobis / (2.0 * count), 1.6);
+}
+
+TEST(CorrectForParallax, SaysNothingBeyondTheImage) {
+  const cv::Mat image = Draw({});
+  const auto patch = PatchTemplate::Sample(image, {100.0, 100.0}, Eigen::Matrix2d::Identity());
+  ASSERT_TRUE(patch);
+  PatchAlignment beyond;
+  beyond.center_px = {2.0, 100.0};
+  beyond.covariance.setIdentity();
+  EXPECT_FALSE(CorrectForParallax(*patch, image, beyond, {{1.0, 0.0}, 0.05}));
+}
+
 }  // namespace
 }  // namespace rotslam
