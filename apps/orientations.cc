@@ -1,6 +1,9 @@
 #include "apps/orientations.h"
 
 #include <algorithm>
+#include <array>
+#include <cmath>
+#include <cstdio>
 #include <iterator>
 #include <stdexcept>
 #include <utility>
@@ -44,6 +47,29 @@ std::vector<FrameId> FindBreaks(const ViewGraph& graph, const RotationMap& rotat
     is_first = false;
   }
   return breaks;
+}
+
+// Loops right round measure the scale of all turns.
+void WarnOfTurnScale(const std::vector<LoopCheck>& loops, Progress& progress) {
+  constexpr double kNotable = 0.02;
+  std::vector<double> scales;
+  for (const LoopCheck& loop : loops) {
+    if (loop.accepted && loop.way.turn_scale != 1.0) scales.push_back(loop.way.turn_scale);
+  }
+  if (scales.empty()) return;
+  const auto middle = scales.begin() + static_cast<std::ptrdiff_t>(scales.size() / 2);
+  std::nth_element(scales.begin(), middle, scales.end());
+  if (std::abs(*middle - 1.0) < kNotable) return;
+  std::array<char, 160> text = {};
+  std::snprintf(text.data(),
+                text.size(),
+                "turns around %zu closed loops come out %.1f %% too %s: check the focal length, "
+                "which seems too %s",
+                scales.size(),
+                100.0 * std::abs(*middle - 1.0),
+                *middle > 1.0 ? "small" : "large",
+                *middle > 1.0 ? "long" : "short");
+  progress.Warn(text.data());
 }
 
 }  // namespace
@@ -111,6 +137,7 @@ Orientations FindOrientations(Input& input,
                   (count == 1 ? " frame matches no other; its orientation is interpolated"
                               : " frames match no other; their orientations are interpolated"));
   }
+  WarnOfTurnScale(orientations.loops, progress);
   for (const FrameId frame : orientations.breaks) {
     progress.Warn("frame " + std::to_string(frame.value) +
                   " matches none before it; the turn across this gap is extrapolated");
@@ -167,7 +194,9 @@ std::vector<LoopRow> LoopRows(const Orientations& orientations) {
                     check.score,
                     check.num_inliers,
                     check.angle_deg,
-                    check.accepted});
+                    check.accepted,
+                    check.way.turn_scale,
+                    check.way.angle_deg});
   }
   return rows;
 }

@@ -1,5 +1,7 @@
 #include "output/loops_csv.h"
 
+#include <algorithm>
+#include <array>
 #include <cmath>
 #include <stdexcept>
 #include <string>
@@ -10,15 +12,19 @@
 namespace rotslam {
 
 void WriteLoopsCsv(const std::filesystem::path& path, const std::vector<LoopRow>& rows) {
-  std::string text = "frame,match,score,inliers,angle_deg,accepted\n";
+  std::string text = "frame,match,score,inliers,angle_deg,accepted,turn_scale,scaled_angle_deg\n";
   for (const LoopRow& row : rows) {
-    if (!std::isfinite(row.score) || !std::isfinite(row.angle_deg)) {
+    const std::array<double, 4> numbers = {
+        row.score, row.angle_deg, row.turn_scale, row.scaled_angle_deg};
+    if (!std::all_of(numbers.begin(), numbers.end(), [](double x) { return std::isfinite(x); })) {
       throw std::invalid_argument("WriteLoopsCsv: frame " + std::to_string(row.frame) +
                                   ": a number is not finite");
     }
     text += std::to_string(row.frame) + ',' + std::to_string(row.match) + ',' +
             FormatNumber("%.6g", row.score) + ',' + std::to_string(row.inliers) + ',' +
-            FormatNumber("%.6g", row.angle_deg) + ',' + (row.accepted ? "1\n" : "0\n");
+            FormatNumber("%.6g", row.angle_deg) + ',' + (row.accepted ? "1," : "0,") +
+            FormatNumber("%.6g", row.turn_scale) + ',' +
+            FormatNumber("%.6g", row.scaled_angle_deg) + '\n';
   }
   ReplaceFile(path, text);
 }

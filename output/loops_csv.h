@@ -13,11 +13,14 @@ struct LoopRow {
   int inliers = 0;         // matches that agree with the relative rotation
   double angle_deg = 0.0;  // of the rotation around the loop, before it was closed
   bool accepted = false;
+  // What all turns of the way in between are scaled by to fit best, and what is left of the angle.
+  double turn_scale = 1.0;
+  double scaled_angle_deg = 0.0;
 };
 
-/// loops.csv: `frame,match,score,inliers,angle_deg,accepted`, one line per row; accepted is 1 or 0.
-/// Throws std::invalid_argument for a number that is not finite, std::runtime_error when the file
-/// cannot be written; never leaves half a file.
+/// loops.csv: `frame,match,score,inliers,angle_deg,turn_scale,scaled_angle_deg,accepted`, one line
+/// per row; accepted is 1 or 0. Throws std::invalid_argument for a number that is not finite,
+/// std::runtime_error when the file cannot be written; never leaves half a file.
 void WriteLoopsCsv(const std::filesystem::path& path, const std::vector<LoopRow>& rows);
 
 }  // namespace rotslam

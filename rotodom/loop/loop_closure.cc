@@ -225,6 +225,7 @@ LoopCheck LoopClosure::Verify(const Place& place,
           candidate.score,
           evidence.num_inliers,
           evidence.angle_deg,
+          evidence.way,
           evidence.accepted};
 }
 

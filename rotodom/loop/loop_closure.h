@@ -61,6 +61,7 @@ struct LoopCheck {
   int num_inliers = 0;
   // Of the rotation around the loop: measured edge against the orientations before it.
   double angle_deg = 0.0;
+  WayAround way;
   bool accepted = false;
 };
 

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <iterator>
 
 #include <Eigen/Eigenvalues>
 
@@ -59,9 +60,19 @@ struct Opinion {
   Rotation view_from_world;
 };
 
-// The opinions within `max_angle_deg` of one of them, that being the one around which most matches
-// agree; positions, those with most matches first.
-std::vector<int> LargestAgreement(const std::vector<Opinion>& opinions, double max_angle_deg) {
+// Whether the cycle view - one old place - another one - view closes.
+bool DoAgree(const Opinion& one, const Opinion& other, const VerificationOptions& options) {
+  const Rotation around = other.view_from_world * one.view_from_world.Inverse();
+  const Rotation other_from_one =
+      other.connection.edge.j_from_i.Inverse() * one.connection.edge.j_from_i;
+  return around.AngleDeg() <=
+         options.max_cycle_deg + options.max_turn_error * other_from_one.AngleDeg();
+}
+
+// The opinions that agree with one of them, that being the one around which most matches do;
+// positions, those with most matches first.
+std::vector<int> LargestAgreement(const std::vector<Opinion>& opinions,
+                                  const VerificationOptions& options) {
   const auto inliers = [&](int index) { return opinions[index].connection.edge.num_inliers; };
   const int count = static_cast<int>(opinions.size());
   std::vector<int> largest;
@@ -70,9 +81,7 @@ std::vector<int> LargestAgreement(const std::vector<Opinion>& opinions, double m
     std::vector<int> agreeing = {center};
     int num_inliers = inliers(center);
     for (int other = 0; other < count; ++other) {
-      const Rotation turn =
-          opinions[other].view_from_world * opinions[center].view_from_world.Inverse();
-      if (other == center || turn.AngleDeg() > max_angle_deg) continue;
+      if (other == center || !DoAgree(opinions[center], opinions[other], options)) continue;
       agreeing.push_back(other);
       num_inliers += inliers(other);
     }
@@ -100,7 +109,42 @@ std::optional<std::string> VerificationOptions::Problem() const {
   if (!(max_drift_deg_per_sqrt_frame >= 0.0)) {
     return OutOfRange("max_drift_deg_per_sqrt_frame", max_drift_deg_per_sqrt_frame, "zero or more");
   }
+  if (!(max_turn_error >= 0.0 && max_turn_error < 1.0)) {
+    return OutOfRange("max_turn_error", max_turn_error, "0 or more and below 1");
+  }
   return std::nullopt;
+}
+
+WayAround ScaleTurns(const RotationMap& cam_from_world,
+                     const RelativeRotation& loop,
+                     double max_turn_error) {
+  // Less turn in sum than this, radians, tells nothing of its scale.
+  constexpr double kLeastTurn = 1.0;
+  constexpr double kSmallStep = 1e-3;
+  constexpr int kRounds = 4;
+  std::vector<Eigen::Vector3d> turns;
+  const auto last = cam_from_world.find(loop.j);
+  for (auto frame = cam_from_world.find(loop.i); frame != last; ++frame) {
+    turns.push_back((std::next(frame)->second * frame->second.Inverse()).Log());
+  }
+  const auto around = [&](double scale) {
+    Rotation j_from_i;
+    for (const Eigen::Vector3d& turn : turns) j_from_i = Rotation::Exp(scale * turn) * j_from_i;
+    return loop.j_from_i * j_from_i.Inverse();
+  };
+  double scale = 1.0;
+  Rotation rest = around(scale);
+  for (int round = 0; round < kRounds; ++round) {
+    const Eigen::Vector3d slope = (around(scale + kSmallStep) * rest.Inverse()).Log() / kSmallStep;
+    if (slope.norm() < kLeastTurn) break;
+    const double step = -slope.dot(rest.Log()) / slope.squaredNorm();
+    const double next = std::clamp(scale + step, 1.0 - max_turn_error, 1.0 + max_turn_error);
+    const Rotation next_rest = around(next);
+    if (next_rest.Angle() >= rest.Angle()) break;
+    scale = next;
+    rest = next_rest;
+  }
+  return {scale, rest.AngleDeg()};
 }
 
 LoopEvidence VerifyLoop(const Features& view,
@@ -127,11 +171,14 @@ LoopEvidence VerifyLoop(const Features& view,
     const Rotation view_from_world = edge->edge.j_from_i * old_from_world;
     opinions.push_back({*std::move(edge), view_from_world});
   }
-  const std::vector<int> agreeing = LargestAgreement(opinions, options.max_cycle_deg);
+  const std::vector<int> agreeing = LargestAgreement(opinions, options);
   const Opinion& best = opinions[agreeing.front()];
   evidence.match = best.connection.edge.i;
   evidence.num_inliers = best.connection.edge.num_inliers;
   evidence.angle_deg = (best.view_from_world * present_view_from_world.Inverse()).AngleDeg();
+  if (is_way_known) {
+    evidence.way = ScaleTurns(cam_from_world, best.connection.edge, options.max_turn_error);
+  }
   const int num_frames = view.frame.value - evidence.match.value;
   const double drift_deg = options.max_drift_deg + options.max_drift_deg_per_sqrt_frame *
                                                        std::sqrt(static_cast<double>(num_frames));
@@ -139,7 +186,7 @@ LoopEvidence VerifyLoop(const Features& view,
   for (const int index : agreeing) num_inliers += opinions[index].connection.edge.num_inliers;
   evidence.accepted = static_cast<int>(agreeing.size()) >= options.min_edges &&
                       (num_inliers >= options.sure_inliers || num_consistent > 1) &&
-                      (!is_way_known || evidence.angle_deg <= drift_deg);
+                      (!is_way_known || evidence.way.angle_deg <= drift_deg);
   if (!evidence.accepted) return evidence;
   for (const int index : agreeing) {
     evidence.connections.push_back(std::move(opinions[index].connection));

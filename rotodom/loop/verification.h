@@ -35,6 +35,9 @@ struct VerificationOptions {
   // two places: a loop that contradicts them by more is a wrong place with a similar look.
   double max_drift_deg = 3.0;
   double max_drift_deg_per_sqrt_frame = 0.3;
+  // With a wrong focal length all turns come out too large or too small: orientations may be wrong
+  // by up to this share of the turns between them, too, when all turns share it.
+  double max_turn_error = 0.1;
 
   std::optional<std::string> Problem() const;
 
@@ -48,8 +51,24 @@ struct VerificationOptions {
     visit("sure_inliers", sure_inliers);
     visit("max_drift_deg", max_drift_deg);
     visit("max_drift_deg_per_sqrt_frame", max_drift_deg_per_sqrt_frame);
+    visit("max_turn_error", max_turn_error);
   }
 };
+
+/// The way from one end of a loop to the other with all its turns scaled alike, so that it fits the
+/// measured rotation best.
+struct WayAround {
+  double turn_scale = 1.0;  // one where the way has too little turn in sum to tell
+  double angle_deg = 0.0;   // what is left of the rotation around the loop
+};
+
+/// Finds that scale. On a way that turns right round it measures the focal length: a scale above
+/// one says that the true one is shorter.
+/// @param cam_from_world  orientations of both ends and of all frames between them.
+/// @param max_turn_error  the scale stays within one +- this.
+WayAround ScaleTurns(const RotationMap& cam_from_world,
+                     const RelativeRotation& loop,
+                     double max_turn_error);
 
 /// How a present place was compared with an old one.
 struct LoopEvidence {
@@ -58,6 +77,7 @@ struct LoopEvidence {
   int num_inliers = 0;  // of that edge
   // Of the rotation around the loop: that edge against the present orientations.
   double angle_deg = 0.0;
+  WayAround way;
   bool accepted = false;
   // When accepted: the edges that agree with each other, the best one first.
   std::vector<Connection> connections;
@@ -75,7 +95,7 @@ struct VerificationTools {
 /// consistent with one another and with what is known of the way between.
 /// @param view             described features of the present place.
 /// @param old_places       described features; the candidate first, then its neighbours, if any.
-/// @param cam_from_world   present orientations of all of them.
+/// @param cam_from_world   present orientations of all of them, and of the frames in between.
 /// @param num_consistent   as in LoopCandidate.
 /// @param is_way_known     orientations of the two places are linked by edges, so that drift is all
 ///                         that can be wrong with them.

@@ -14,7 +14,7 @@ namespace rotslam {
 namespace {
 
 std::vector<LoopRow> SomeRows() {
-  return {{120, 3, 0.0625, 187, 2.5, true}, {131, 7, 1.0 / 3.0, 0, 0.0, false}};
+  return {{120, 3, 0.0625, 187, 2.5, true, 1.04, 0.5}, {131, 7, 1.0 / 3.0, 0, 0.0, false}};
 }
 
 TEST(LoopsCsv, HasOneLinePerRow) {
@@ -22,11 +22,11 @@ TEST(LoopsCsv, HasOneLinePerRow) {
   const std::filesystem::path path = folder.path() / "loops.csv";
   WriteLoopsCsv(path, SomeRows());
   EXPECT_EQ(ReadWholeFile(path),
-            "frame,match,score,inliers,angle_deg,accepted\n"
-            "120,3,0.0625,187,2.5,1\n"
-            "131,7,0.333333,0,0,0\n");
+            "frame,match,score,inliers,angle_deg,accepted,turn_scale,scaled_angle_deg\n"
+            "120,3,0.0625,187,2.5,1,1.04,0.5\n"
+            "131,7,0.333333,0,0,0,1,0\n");
   WriteLoopsCsv(path, {});
-  EXPECT_EQ(ReadWholeFile(path), "frame,match,score,inliers,angle_deg,accepted\n");
+  EXPECT_EQ(ReadWholeFile(path), "frame,match,score,inliers,angle_deg,accepted,turn_scale,scaled_angle_deg\n");
 }
 
 TEST(LoopsCsv, RefusesNumbersThatAreNotFinite) {
@@ -41,6 +41,7 @@ TEST(LoopsCsv, RefusesNumbersThatAreNotFinite) {
   for (const double number : {std::nan(""), kInfinity, -kInfinity}) {
     EXPECT_THROW(write([&](LoopRow& row) { row.score = number; }), std::invalid_argument);
     EXPECT_THROW(write([&](LoopRow& row) { row.angle_deg = number; }), std::invalid_argument);
+    EXPECT_THROW(write([&](LoopRow& row) { row.turn_scale = number; }), std::invalid_argument);
   }
   EXPECT_FALSE(std::filesystem::exists(path));
 }

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <cstring>
+#include <numbers>
 #include <random>
 #include <utility>
 
@@ -320,6 +321,82 @@ TEST(VerifyLoop, DriftMayGrowWithTheWay) {
     c.cam_from_world[c.view.frame] = c.cam_from_world.at(FrameId{kPresent});
     EXPECT_EQ(c.Verify().accepted, is_accepted) << frame;
   }
+}
+
+// Once round between the two frames, with all turns `scale` times as large as they are.
+void GoRound(const Rotation& from,
+             const Rotation& to,
+             double scale,
+             FrameId first,
+             FrameId last,
+             RotationMap& cam_from_world) {
+  const int num_steps = last.value - first.value;
+  Eigen::Vector3d turn = (to * from.Inverse()).Log();
+  turn *= 1.0 + 2.0 * std::numbers::pi / turn.norm();
+  for (int step = 0; step <= num_steps; ++step) {
+    cam_from_world[FrameId{first.value + step}] =
+        Rotation::Exp(scale * step / num_steps * turn) * from;
+  }
+}
+
+TEST(VerifyLoop, AllTurnsMayBeTooSmall) {
+  Case c = TruePlace();
+  const LoopEvidence closed = c.Verify();
+  ASSERT_TRUE(closed.accepted);
+  const Rotation present = c.cam_from_world.at(FrameId{kPresent});
+  c.view.frame = FrameId{60};
+  GoRound(
+      c.cam_from_world.at(closed.match), present, 0.93, FrameId{3}, c.view.frame, c.cam_from_world);
+  const LoopEvidence round = c.Verify();
+  EXPECT_TRUE(round.accepted);
+  EXPECT_GT(round.angle_deg, 20.0);
+  EXPECT_NEAR(round.way.turn_scale, 1.0 / 0.93, 0.003);
+  EXPECT_LT(round.way.angle_deg, 1.0);
+  c.options.max_turn_error = 0.02;
+  ExpectRefused(c.Verify());
+}
+
+TEST(ScaleTurns, FindsTheScaleThatClosesTheWay) {
+  const Rotation from = Rotation::Exp({0.1, 0.2, 0.3});
+  const Rotation to = Rotation::Exp({0.05, 0.4, 0.0});
+  RelativeRotation loop;
+  loop.i = FrameId{0};
+  loop.j = FrameId{25};
+  loop.j_from_i = to * from.Inverse();
+  for (const double scale : {0.92, 1.0, 1.05}) {
+    RotationMap cam_from_world;
+    GoRound(from, to, scale, loop.i, loop.j, cam_from_world);
+    const WayAround way = ScaleTurns(cam_from_world, loop, 0.1);
+    EXPECT_NEAR(way.turn_scale, 1.0 / scale, 1e-6);
+    EXPECT_LT(way.angle_deg, 1e-4);
+  }
+}
+
+TEST(ScaleTurns, StaysWithinItsBound) {
+  const Rotation from;
+  const Rotation to = Rotation::Exp({0.0, 0.3, 0.0});
+  RelativeRotation loop;
+  loop.i = FrameId{0};
+  loop.j = FrameId{25};
+  loop.j_from_i = to;
+  RotationMap cam_from_world;
+  GoRound(from, to, 0.8, loop.i, loop.j, cam_from_world);
+  const WayAround way = ScaleTurns(cam_from_world, loop, 0.1);
+  EXPECT_NEAR(way.turn_scale, 1.1, 1e-9);
+  EXPECT_GT(way.angle_deg, 30.0);
+}
+
+TEST(ScaleTurns, SaysNothingOfAStraightWay) {
+  RelativeRotation loop;
+  loop.i = FrameId{0};
+  loop.j = FrameId{2};
+  loop.j_from_i = Rotation::Exp({0.0, 0.05, 0.0});
+  const RotationMap cam_from_world = {{FrameId{0}, Rotation()},
+                                      {FrameId{1}, Rotation::Exp({0.0, 0.02, 0.0})},
+                                      {FrameId{2}, Rotation::Exp({0.0, 0.03, 0.0})}};
+  const WayAround way = ScaleTurns(cam_from_world, loop, 0.1);
+  EXPECT_EQ(way.turn_scale, 1.0);
+  EXPECT_NEAR(way.angle_deg, 0.02 * kDegFromRad, 1e-9);
 }
 
 TEST(VerifyLoop, RefusesUncertainEdges) {
