@@ -44,6 +44,10 @@ class Verifier {
     const double least = options_.min_inlier_ratio * static_cast<double>(keypoints.size());
     if (inliers < options_.min_inliers || inliers < least) return std::nullopt;
     if (LargestSigmaDeg(connection->edge.covariance) > options_.max_sigma_deg) return std::nullopt;
+    if (camera_.readout_s > 0.0) {
+      const double sigma = options_.shutter_sigma_deg * kRadFromDeg;
+      connection->edge.covariance += sigma * sigma * Eigen::Matrix3d::Identity();
+    }
     return connection;
   }
 
@@ -58,21 +62,22 @@ class Verifier {
 struct Opinion {
   Connection connection;
   Rotation view_from_world;
+  WayAround way;
 };
 
-// Whether the cycle view - one old place - another one - view closes.
-bool DoAgree(const Opinion& one, const Opinion& other, const VerificationOptions& options) {
+// Whether the cycle view - one old place - another one - view closes, the turn between the places
+// being as wrong as all others.
+bool DoAgree(const Opinion& one, const Opinion& other, double max_cycle_deg) {
   const Rotation around = other.view_from_world * one.view_from_world.Inverse();
   const Rotation other_from_one =
       other.connection.edge.j_from_i.Inverse() * one.connection.edge.j_from_i;
   return around.AngleDeg() <=
-         options.max_cycle_deg + options.max_turn_error * other_from_one.AngleDeg();
+         max_cycle_deg + std::abs(one.way.turn_scale - 1.0) * other_from_one.AngleDeg();
 }
 
 // The opinions that agree with one of them, that being the one around which most matches do;
-// positions, those with most matches first.
-std::vector<int> LargestAgreement(const std::vector<Opinion>& opinions,
-                                  const VerificationOptions& options) {
+// positions, the most certain one first.
+std::vector<int> LargestAgreement(const std::vector<Opinion>& opinions, double max_cycle_deg) {
   const auto inliers = [&](int index) { return opinions[index].connection.edge.num_inliers; };
   const int count = static_cast<int>(opinions.size());
   std::vector<int> largest;
@@ -81,7 +86,7 @@ std::vector<int> LargestAgreement(const std::vector<Opinion>& opinions,
     std::vector<int> agreeing = {center};
     int num_inliers = inliers(center);
     for (int other = 0; other < count; ++other) {
-      if (other == center || !DoAgree(opinions[center], opinions[other], options)) continue;
+      if (other == center || !DoAgree(opinions[center], opinions[other], max_cycle_deg)) continue;
       agreeing.push_back(other);
       num_inliers += inliers(other);
     }
@@ -89,8 +94,11 @@ std::vector<int> LargestAgreement(const std::vector<Opinion>& opinions,
     most_inliers = num_inliers;
     largest = std::move(agreeing);
   }
+  const auto variance = [&](int index) {
+    return opinions[index].connection.edge.covariance.trace();
+  };
   std::stable_sort(
-      largest.begin(), largest.end(), [&](int a, int b) { return inliers(a) > inliers(b); });
+      largest.begin(), largest.end(), [&](int a, int b) { return variance(a) < variance(b); });
   return largest;
 }
 
@@ -102,6 +110,9 @@ std::optional<std::string> VerificationOptions::Problem() const {
     return OutOfRange("min_inlier_ratio", min_inlier_ratio, "0 or more and below 1");
   }
   if (!(max_sigma_deg > 0.0)) return OutOfRange("max_sigma_deg", max_sigma_deg, "above 0");
+  if (!(shutter_sigma_deg >= 0.0)) {
+    return OutOfRange("shutter_sigma_deg", shutter_sigma_deg, "zero or more");
+  }
   if (min_edges < 1) return OutOfRange("min_edges", min_edges, "at least 1");
   if (sure_inliers < 0) return OutOfRange("sure_inliers", sure_inliers, "zero or more");
   if (!(max_cycle_deg > 0.0)) return OutOfRange("max_cycle_deg", max_cycle_deg, "above 0");
@@ -119,7 +130,7 @@ WayAround ScaleTurns(const RotationMap& cam_from_world,
                      const RelativeRotation& loop,
                      double max_turn_error) {
   // Less turn in sum than this, radians, tells nothing of its scale.
-  constexpr double kLeastTurn = 1.0;
+  constexpr double kLeastTurn = 3.0;
   constexpr double kSmallStep = 1e-3;
   constexpr int kRounds = 4;
   std::vector<Eigen::Vector3d> turns;
@@ -169,16 +180,16 @@ LoopEvidence VerifyLoop(const Features& view,
       continue;
     }
     const Rotation view_from_world = edge->edge.j_from_i * old_from_world;
-    opinions.push_back({*std::move(edge), view_from_world});
+    const WayAround way =
+        is_way_known ? ScaleTurns(cam_from_world, edge->edge, options.max_turn_error) : WayAround();
+    opinions.push_back({*std::move(edge), view_from_world, way});
   }
-  const std::vector<int> agreeing = LargestAgreement(opinions, options);
+  const std::vector<int> agreeing = LargestAgreement(opinions, options.max_cycle_deg);
   const Opinion& best = opinions[agreeing.front()];
   evidence.match = best.connection.edge.i;
   evidence.num_inliers = best.connection.edge.num_inliers;
   evidence.angle_deg = (best.view_from_world * present_view_from_world.Inverse()).AngleDeg();
-  if (is_way_known) {
-    evidence.way = ScaleTurns(cam_from_world, best.connection.edge, options.max_turn_error);
-  }
+  evidence.way = best.way;
   const int num_frames = view.frame.value - evidence.match.value;
   const double drift_deg = options.max_drift_deg + options.max_drift_deg_per_sqrt_frame *
                                                        std::sqrt(static_cast<double>(num_frames));

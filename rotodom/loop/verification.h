@@ -23,6 +23,9 @@ struct VerificationOptions {
   // An edge that is less certain of its rotation than this, one standard deviation of the least
   // certain axis, tells nothing of drift.
   double max_sigma_deg = 0.2;
+  // With a rolling shutter the rows of a moving camera see the scene from different places. From
+  // frame to frame that is much the same; to an edge between two visits it adds this, on each axis.
+  double shutter_sigma_deg = 0.3;
   // Rotations around short cycles, present place - old place - its neighbour, close to this. Two
   // views of a plane, or with little overlap, have several solutions; over three views only the
   // right one is the same.
@@ -46,6 +49,7 @@ struct VerificationOptions {
     visit("min_inliers", min_inliers);
     visit("min_inlier_ratio", min_inlier_ratio);
     visit("max_sigma_deg", max_sigma_deg);
+    visit("shutter_sigma_deg", shutter_sigma_deg);
     visit("max_cycle_deg", max_cycle_deg);
     visit("min_edges", min_edges);
     visit("sure_inliers", sure_inliers);
@@ -72,14 +76,14 @@ WayAround ScaleTurns(const RotationMap& cam_from_world,
 
 /// How a present place was compared with an old one.
 struct LoopEvidence {
-  // The old place that the best edge leads to; the candidate when there is none.
+  // The old place that the most certain edge leads to; the candidate when there is none.
   FrameId match;
   int num_inliers = 0;  // of that edge
   // Of the rotation around the loop: that edge against the present orientations.
   double angle_deg = 0.0;
   WayAround way;
   bool accepted = false;
-  // When accepted: the edges that agree with each other, the best one first.
+  // When accepted: the edges that agree with each other, the most certain one first.
   std::vector<Connection> connections;
 };
 
