@@ -9,6 +9,7 @@
 #include <queue>
 #include <tuple>
 
+#include "rotodom/types/disjoint_sets.h"
 #include "rotodom/types/parallel.h"
 
 namespace rotslam {
@@ -47,26 +48,6 @@ double Hash(std::uint64_t seed, std::uint64_t trial, std::uint64_t edge) {
   z = (z ^ (z >> 27)) * 0x94d049bb133111ebU;
   return static_cast<double>((z ^ (z >> 31)) >> 11) * 0x1p-53;
 }
-
-class DisjointSets {
- public:
-  explicit DisjointSets(int size) : parent_(static_cast<std::size_t>(size)) {
-    std::iota(parent_.begin(), parent_.end(), 0);
-  }
-  int Find(int k) {
-    while (parent_[k] != k) k = parent_[k] = parent_[parent_[k]];
-    return k;
-  }
-  // The smaller number names the set.
-  void Join(int a, int b) {
-    a = Find(a);
-    b = Find(b);
-    parent_[std::max(a, b)] = std::min(a, b);
-  }
-
- private:
-  std::vector<int> parent_;
-};
 
 class Consensus {
  public:
