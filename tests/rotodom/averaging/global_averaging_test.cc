@@ -311,7 +311,7 @@ TEST(CloseLoops, AdoptsRightLoopsAgainstDriftAndRefusesAFalseOne) {
     return (estimate.at(edge.j) * estimate.at(edge.i).Inverse() * edge.j_from_i.Inverse())
         .AngleDeg();
   };
-  const GlobalAveragingResult result = CloseLoops(scene.graph, scene.chained, {}, 2);
+  const GlobalAveragingResult result = CloseLoops(scene.graph.edges(), scene.chained, {}, 2);
   double largest_drift = 0.0;
   for (std::size_t k = num_chain_edges; k < scene.graph.edges().size(); ++k) {
     const RelativeRotation& edge = scene.graph.edges()[k];
@@ -334,7 +334,7 @@ TEST(CloseLoops, LeavesADriftThatOnlyAFalseLoopContradicts) {
   Drifted scene = MakeDrifted();
   std::mt19937_64 random(3);
   AddLoop(scene, 100, 1900, 20.0, random);
-  const GlobalAveragingResult result = CloseLoops(scene.graph, scene.chained, {}, 2);
+  const GlobalAveragingResult result = CloseLoops(scene.graph.edges(), scene.chained, {}, 2);
   const double before = CompareOrientations(scene.chained, scene.truth).max_deg;
   EXPECT_LT(CompareOrientations(result.cam_from_world, scene.truth).max_deg, 1.5 * before + 0.1);
 }
