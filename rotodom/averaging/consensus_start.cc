@@ -259,7 +259,11 @@ void Consensus::ConfirmByTrees(int first_trial) {
 void Consensus::ConfirmByBestTrees() {
   if (graph_.num_edges() == 0) return;
   const int max_beginnings =
-      std::clamp(static_cast<int>(kBeginningEdges / graph_.num_edges()), 1, kMaxBeginnings);
+      std::min(static_cast<int>(kBeginningEdges / graph_.num_edges()), kMaxBeginnings);
+  if (max_beginnings < 2) {
+    ConfirmByTrees(0);
+    return;
+  }
   const EdgeKnowledge by_short_cycles = knowledge_;
   EdgeKnowledge best;
   double least_doubt = std::numeric_limits<double>::infinity();

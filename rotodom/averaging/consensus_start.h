@@ -53,7 +53,7 @@ struct ConsensusStart {
 ///    that fewest contradict is kept.
 ///
 /// Every piece of the graph without a held view gets a root of its own at the identity.
-/// Cost:    O(E log E) a round for E edges, some five rounds, up to five times that below 4,000
+/// Cost:    O(E log E) a round for E edges, some five rounds, up to five times that below 10,000
 ///          edges; cycles O(E degree^2) at most.
 /// Source:  the idea of confirming by cycles is Zach et al., Disambiguating Visual Relations Using
 ///          Loop Constraints, CVPR 2010; pieces and votes between them are ours.
