@@ -29,15 +29,14 @@ LoopedEstimate LoopedOdometry::AddFrame(FrameId frame, double timestamp_s, const
   looped.frame = frame;
   looped.covariance = estimate.covariance;
   looped.report = estimate.report;
+  orientations_.BeginFrame(estimate);
+  LoopReport loops;
   if (closure_) {
-    orientations_.AddFrame(estimate);
-    LoopReport loops =
-        closure_->AddFrame(estimate, image, result().cam_from_world, orientations_.pieces());
-    orientations_.AddLoop(std::move(loops.connections));
-    looped.loops = std::move(loops.checks);
-  } else {
-    orientations_.AddFrame(std::move(estimate));
+    loops = closure_->AddFrame(estimate, image, result().cam_from_world, orientations_.pieces());
   }
+  orientations_.AddFrame(std::move(estimate));
+  orientations_.AddLoop(std::move(loops.connections));
+  looped.loops = std::move(loops.checks);
   looped.has_averaged = orientations_.EndFrame();
   looped.cam_from_world = result().cam_from_world.at(frame);
   return looped;

@@ -18,11 +18,17 @@ LoopedOrientations::LoopedOrientations(const AveragingOptions& averaging,
       keep_features_(keep_features),
       num_threads_(num_threads) {}
 
-void LoopedOrientations::AddFrame(FrameEstimate estimate) {
+void LoopedOrientations::BeginFrame(FrameEstimate& estimate) {
   if (odometry_from_world_) {
+    estimate.cam_from_world = estimate.cam_from_world * *odometry_from_world_;
     std::erase_if(estimate.window, [&](const auto& entry) { return entry.first <= settled_; });
     for (auto& [view, rotation] : estimate.window) rotation = rotation * *odometry_from_world_;
   }
+  newest_ = estimate.frame;
+  result_.cam_from_world[newest_] = estimate.cam_from_world;
+}
+
+void LoopedOrientations::AddFrame(FrameEstimate estimate) {
   if (estimate.report.weak) {
     const RelativeRotation& edge = estimate.connections.front().edge;
     weak_edges_.emplace(edge.i, edge.j);
@@ -31,7 +37,6 @@ void LoopedOrientations::AddFrame(FrameEstimate estimate) {
       pieces_.Join(connection.edge.i.value, connection.edge.j.value);
     }
   }
-  newest_ = estimate.frame;
   result_.Add(std::move(estimate), keep_features_);
 }
 

@@ -26,7 +26,10 @@ class LoopedOrientations {
                      bool keep_features,
                      int num_threads);
 
-  /// Takes the next frame, in the odometry's world.
+  /// Turns the next frame's estimate from the odometry's world into the present one and takes its
+  /// orientation, which is all that the search for loops needs.
+  void BeginFrame(FrameEstimate& estimate);
+  /// Takes the rest of it: edges, older orientations, features.
   void AddFrame(FrameEstimate estimate);
 
   /// Takes the edges of an accepted loop, the best one first, or none. Where no way was known

@@ -181,6 +181,7 @@ void BM_Stream(benchmark::State& state) {
         loop.push_back({edge, {}, {}});
       }
       const auto start = std::chrono::steady_clock::now();
+      orientations.BeginFrame(estimate);
       orientations.AddFrame(std::move(estimate));
       orientations.AddLoop(std::move(loop));
       num_moved += orientations.EndFrame() ? 1 : 0;

@@ -109,7 +109,9 @@ Course Follow(const Scene& scene, const RunOptions& options = {}) {
   run.after_frame.reserve(kNumFrames);
   for (int frame = 0; frame < kNumFrames; ++frame) {
     const bool is_break = std::count(scene.breaks.begin(), scene.breaks.end(), frame) > 0;
-    orientations.AddFrame(odometry.Next(is_break));
+    FrameEstimate estimate = odometry.Next(is_break);
+    orientations.BeginFrame(estimate);
+    orientations.AddFrame(std::move(estimate));
     for (const Loop& loop : scene.loops) {
       if (loop.after != frame) continue;
       orientations.AddLoop(LoopEdges(loop, options.loop_variance));
