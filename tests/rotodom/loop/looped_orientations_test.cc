@@ -19,6 +19,7 @@ namespace rotslam {
 namespace {
 
 constexpr int kNumFrames = 120;
+constexpr double kWeakErrorDeg = 5.0;
 
 struct Loop {
   int after = 0;  // comes with this frame
@@ -29,6 +30,7 @@ struct Loop {
 struct Scene {
   std::vector<Loop> loops = {};
   std::vector<int> breaks = {};  // frames without edges to older ones
+  std::vector<int> weak = {};    // frames with one edge, to the frame before, which is wrong
 };
 
 struct RunOptions {
@@ -45,7 +47,7 @@ const RotationGraph& Graph() {
 // The windowed odometry, orientations of all frames kept.
 class Odometry {
  public:
-  FrameEstimate Next(bool is_break) {
+  FrameEstimate Next(bool is_break, bool is_weak) {
     FrameEstimate estimate;
     estimate.frame = FrameId{next_++};
     const RotationGraph& scene = Graph();
@@ -54,6 +56,14 @@ class Odometry {
       const RelativeRotation& edge = scene.graph.edges()[index];
       if (edge.j != estimate.frame || edge.i < oldest_partner_) continue;
       estimate.connections.push_back({edge, {}, {}});
+      graph_.AddEdge(edge);
+    }
+    estimate.report.weak = is_weak;
+    if (is_weak) {
+      RelativeRotation edge =
+          *scene.graph.FindEdge(FrameId{estimate.frame.value - 1}, estimate.frame);
+      edge.j_from_i = Rotation::Exp({0.0, kWeakErrorDeg * kRadFromDeg, 0.0}) * edge.j_from_i;
+      estimate.connections = {{edge, {}, {}}};
       graph_.AddEdge(edge);
     }
     // A break goes on as if the camera had stopped.
@@ -109,7 +119,8 @@ Course Follow(const Scene& scene, const RunOptions& options = {}) {
   run.after_frame.reserve(kNumFrames);
   for (int frame = 0; frame < kNumFrames; ++frame) {
     const bool is_break = std::count(scene.breaks.begin(), scene.breaks.end(), frame) > 0;
-    FrameEstimate estimate = odometry.Next(is_break);
+    const bool is_weak = std::count(scene.weak.begin(), scene.weak.end(), frame) > 0;
+    FrameEstimate estimate = odometry.Next(is_break || is_weak, is_weak);
     orientations.BeginFrame(estimate);
     orientations.AddFrame(std::move(estimate));
     for (const Loop& loop : scene.loops) {
@@ -259,6 +270,15 @@ TEST(LoopedOrientations, TurnNoPieceUnderAnAveraging) {
     EXPECT_LT(TurnDifferenceDeg(run.after_frame[frame], truth, 60, 84), 0.01) << frame;
     EXPECT_LT(TurnDifferenceDeg(run.after_frame[frame], truth, 40, 79), 0.01) << frame;
   }
+}
+
+TEST(LoopedOrientations, BelieveNoWeakEdgeWhereThereIsABetterWay) {
+  const Course run = Follow({.loops = {{80, 40, 79}}, .weak = {70}});
+  const RotationMap& truth = Graph().true_cam_from_world;
+  EXPECT_GT(TurnDifferenceDeg(run.after_frame[79], truth, 40, 70), 0.8 * kWeakErrorDeg);
+  EXPECT_EQ(run.moved, (std::vector<int>{80, 85}));
+  EXPECT_LT(TurnDifferenceDeg(run.after_frame[85], truth, 40, 70), 0.5);
+  EXPECT_LT(TurnDifferenceDeg(run.finished, truth, 40, 70), 0.5);
 }
 
 TEST(LoopedOrientations, PassOnWhatTheAveragingThrows) {
