@@ -2,29 +2,19 @@
 
 #include <algorithm>
 #include <array>
-#include <cmath>
-#include <cstdint>
-#include <functional>
+#include <cstddef>
+#include <limits>
 #include <numeric>
-#include <queue>
 #include <tuple>
+#include <utility>
 
-#include "rotodom/types/parallel.h"
+#include "rotodom/averaging/consensus_graph.h"
+#include "rotodom/averaging/consensus_tree.h"
+#include "rotodom/types/disjoint_sets.h"
 
 namespace rotslam {
 namespace {
 
-constexpr int kEdgesPerChunk = 8192;
-// Cycles enough to decide, and the neighbours of a view that are tried for cycles of four.
-constexpr int kEnoughCycles = 3;
-constexpr int kMaxNeighbours = 32;
-// Right edges close at least this share of their cycles while most edges are right.
-constexpr int kCyclesPerConsistent = 6;
-// Unconfirmed edges on a path count one, those that short cycles contradict more.
-constexpr double kUnconfirmedClass = 1.0;
-constexpr double kContradictedClass = 3.0;
-// Beyond this tolerance agreement is no evidence: one rotation at random in a thousand agrees.
-constexpr double kLargestEvidence_rad = 0.25;
 // Trees at random that are tried in a row without confirming anything, by size of the graph.
 constexpr int kMaxVainTrees = 60;
 constexpr int kMinVainTrees = 2;
@@ -32,238 +22,62 @@ constexpr double kVainTreeEdges = 2.5e5;
 // Edges between two pieces: compared in pairs up to this number; the share that must agree.
 constexpr int kMaxVotes = 64;
 constexpr int kVotesPerAgreement = 4;
-
-// Square of twice the sine of half the angle: the angle's square while it is small.
-double SquaredAngle(const Eigen::Quaterniond& q) { return 4.0 * q.vec().squaredNorm(); }
-
-bool IsEvidence(double squared_tolerance) {
-  return squared_tolerance < kLargestEvidence_rad * kLargestEvidence_rad;
-}
-
-// A number from 0 to 1 that looks random.
-double Hash(std::uint64_t seed, std::uint64_t trial, std::uint64_t edge) {
-  std::uint64_t z = ((seed * 0x2545f4914f6cdd1dU + trial) << 32) + edge + 0x9e3779b97f4a7c15U;
-  z = (z ^ (z >> 30)) * 0xbf58476d1ce4e5b9U;
-  z = (z ^ (z >> 27)) * 0x94d049bb133111ebU;
-  return static_cast<double>((z ^ (z >> 31)) >> 11) * 0x1p-53;
-}
-
-class DisjointSets {
- public:
-  explicit DisjointSets(int size) : parent_(static_cast<std::size_t>(size)) {
-    std::iota(parent_.begin(), parent_.end(), 0);
-  }
-  int Find(int k) {
-    while (parent_[k] != k) k = parent_[k] = parent_[parent_[k]];
-    return k;
-  }
-  // The smaller number names the set.
-  void Join(int a, int b) {
-    a = Find(a);
-    b = Find(b);
-    parent_[std::max(a, b)] = std::min(a, b);
-  }
-
- private:
-  std::vector<int> parent_;
-};
+// Times that trees are begun, by size of the graph, while the best ones contradict more than this
+// share of the edges; and the trials between two beginnings.
+constexpr int kMaxBeginnings = 5;
+constexpr double kBeginningEdges = 2e4;
+constexpr double kLittleDoubt = 0.15;
+constexpr int kTrialsPerBeginning = 1000;
 
 class Consensus {
  public:
-  Consensus(const ConsensusProblem& problem, int num_threads);
+  Consensus(const ConsensusProblem& problem, int num_threads)
+      : problem_(problem),
+        graph_(problem),
+        num_threads_(num_threads),
+        component_(graph_.Components()),
+        cam_from_world_(problem.cam_from_world) {}
   ConsensusStart Find();
 
  private:
-  struct Neighbour {
-    int view;
-    int edge;
-  };
-  enum class Verdict : char { kUnknown, kContradicted, kConfirmed };
-  struct Node {
-    int parent = -1;
-    int edge = -1;
-    int depth = 0;
-    int jump = 0;  // an ancestor, for paths in logarithmic time
-    double path_class = 0.0;
-    double variance = 0.0;
-  };
-  // Candidates for the tree, best last.
-  using Candidate = std::tuple<double, double, int, int>;  // class, variance, view, edge
-
-  std::span<const Neighbour> NeighboursOf(int view) const {
-    return {neighbours_.data() + first_[view],
-            static_cast<std::size_t>(first_[view + 1] - first_[view])};
-  }
-  // The edge's rotation, read from `from`.
-  Eigen::Quaterniond Along(int edge, int from) const {
-    const ConsensusEdge& e = problem_.edges[edge];
-    return e.i == from ? e.j_from_i : e.j_from_i.conjugate();
-  }
-  double Tolerance(double variance) const {
-    return problem_.trust_sigmas * problem_.trust_sigmas * variance;
-  }
-  bool IsConfirmed(int edge) const { return verdict_[edge] == Verdict::kConfirmed; }
-
-  void ListNeighbours();
-  void FindComponents();
-  Verdict JudgeByTriangles(int edge) const;
-  Verdict JudgeBySquares(int edge, std::vector<int>& mark) const;
-  void JudgeByShortCycles();
+  bool IsConfirmed(int edge) const { return knowledge_.IsConfirmed(edge); }
+  void Confirm(int edge) { knowledge_.verdict[edge] = EdgeVerdict::kConfirmed; }
   void JudgeByStart();
   void FindPieces();
   std::vector<int> Roots() const;
-  void BuildTree(int trial);
-  void Settle(int view, int edge);
-  int CommonAncestor(int a, int b) const;
-  double PathVariance(int a, int b) const;
+  ConsensusTree BuildTree(int trial);
   double SquaredResidual(int edge) const;
-  bool Agrees(int edge, bool needs_evidence) const;
-  bool ConfirmCycles();
-  bool ConfirmByVotes();
-  bool ConfirmVotes(std::vector<int>& edges);
-  void ConfirmByTrees();
+  // Of an edge's residual against orientations along the tree.
+  double ToleranceIn(const ConsensusTree& tree, int edge) const;
+  bool Agrees(const ConsensusTree& tree, int edge, bool needs_evidence) const;
+  bool ConfirmCycles(const ConsensusTree& tree);
+  bool ConfirmByVotes(const ConsensusTree& tree);
+  bool ConfirmVotes(const ConsensusTree& tree, std::vector<int>& edges);
+  void ConfirmByTrees(int first_trial);
+  void ConfirmByBestTrees();
+  double DoubtOf(const ConsensusTree& tree) const;
 
   const ConsensusProblem& problem_;
+  ConsensusGraph graph_;
   int num_threads_;
-  int num_edges_;
-  std::vector<int> first_;
-  std::vector<Neighbour> neighbours_;  // by view, then by neighbour
   std::vector<int> component_;
-  std::vector<Verdict> verdict_;
-  std::vector<int> piece_;
-  std::vector<Node> tree_;
+  EdgeKnowledge knowledge_;
   std::vector<Eigen::Quaterniond> cam_from_world_;
 };
 
-Consensus::Consensus(const ConsensusProblem& problem, int num_threads)
-    : problem_(problem),
-      num_threads_(num_threads),
-      num_edges_(static_cast<int>(problem.edges.size())),
-      verdict_(problem.edges.size(), Verdict::kUnknown),
-      piece_(static_cast<std::size_t>(problem.num_views)),
-      cam_from_world_(problem.cam_from_world) {
-  ListNeighbours();
-  FindComponents();
-}
-
-void Consensus::ListNeighbours() {
-  first_.assign(static_cast<std::size_t>(problem_.num_views) + 1, 0);
-  for (const ConsensusEdge& edge : problem_.edges) {
-    ++first_[edge.i + 1];
-    ++first_[edge.j + 1];
-  }
-  std::partial_sum(first_.begin(), first_.end(), first_.begin());
-  neighbours_.resize(2 * problem_.edges.size());
-  std::vector<int> next(first_.begin(), first_.end() - 1);
-  for (int k = 0; k < num_edges_; ++k) {
-    const ConsensusEdge& edge = problem_.edges[k];
-    neighbours_[next[edge.i]++] = {edge.j, k};
-    neighbours_[next[edge.j]++] = {edge.i, k};
-  }
-  for (int view = 0; view < problem_.num_views; ++view) {
-    std::sort(neighbours_.begin() + first_[view],
-              neighbours_.begin() + first_[view + 1],
-              [](const Neighbour& a, const Neighbour& b) {
-                return std::tie(a.view, a.edge) < std::tie(b.view, b.edge);
-              });
-  }
-}
-
-void Consensus::FindComponents() {
-  DisjointSets sets(problem_.num_views);
-  for (const ConsensusEdge& edge : problem_.edges) sets.Join(edge.i, edge.j);
-  component_.assign(static_cast<std::size_t>(problem_.num_views), -1);
-  int count = 0;
-  for (int view = 0; view < problem_.num_views; ++view) {
-    const int first = sets.Find(view);
-    component_[view] = first == view ? count++ : component_[first];
-  }
-}
-
-Consensus::Verdict Consensus::JudgeByTriangles(int edge) const {
-  const ConsensusEdge& e = problem_.edges[edge];
-  const std::span<const Neighbour> at_i = NeighboursOf(e.i);
-  const std::span<const Neighbour> at_j = NeighboursOf(e.j);
-  int tried = 0;
-  int consistent = 0;
-  for (std::size_t a = 0, b = 0; a < at_i.size() && b < at_j.size();) {
-    if (at_i[a].view != at_j[b].view) {
-      ++(at_i[a].view < at_j[b].view ? a : b);
-      continue;
-    }
-    const Neighbour& first = at_i[a++];
-    const Neighbour& last = at_j[b++];
-    const double variance =
-        e.variance + problem_.edges[first.edge].variance + problem_.edges[last.edge].variance;
-    const Eigen::Quaterniond around =
-        Along(last.edge, last.view) * Along(first.edge, e.i) * e.j_from_i.conjugate();
-    const double tolerance = Tolerance(variance);
-    if (!IsEvidence(tolerance)) continue;
-    ++tried;
-    if (SquaredAngle(around) <= tolerance && ++consistent == kEnoughCycles) break;
-  }
-  if (consistent > 0 && kCyclesPerConsistent * consistent >= tried) return Verdict::kConfirmed;
-  return tried > 1 ? Verdict::kContradicted : Verdict::kUnknown;
-}
-
-Consensus::Verdict Consensus::JudgeBySquares(int edge, std::vector<int>& mark) const {
-  const ConsensusEdge& e = problem_.edges[edge];
-  const std::span<const Neighbour> at_i = NeighboursOf(e.i);
-  const std::span<const Neighbour> at_j = NeighboursOf(e.j);
-  const auto few = [](std::span<const Neighbour> all) {
-    return all.first(std::min<std::size_t>(all.size(), kMaxNeighbours));
-  };
-  for (const Neighbour& n : few(at_j)) mark[n.view] = n.edge;
-  int tried = 0;
-  int consistent = 0;
-  for (const Neighbour& n : few(at_i)) {
-    if (n.view == e.j || consistent == kEnoughCycles) continue;
-    const Eigen::Quaterniond to_neighbour = Along(n.edge, e.i);
-    for (const Neighbour& m : few(NeighboursOf(n.view))) {
-      const int back = m.view == e.i || m.view == e.j ? -1 : mark[m.view];
-      if (back < 0) continue;
-      const double variance = e.variance + problem_.edges[n.edge].variance +
-                              problem_.edges[m.edge].variance + problem_.edges[back].variance;
-      const Eigen::Quaterniond around =
-          Along(back, m.view) * Along(m.edge, n.view) * to_neighbour * e.j_from_i.conjugate();
-      const double tolerance = Tolerance(variance);
-      if (!IsEvidence(tolerance)) continue;
-      ++tried;
-      if (SquaredAngle(around) <= tolerance && ++consistent == kEnoughCycles) break;
-    }
-  }
-  for (const Neighbour& n : few(at_j)) mark[n.view] = -1;
-  if (consistent > 0 && 2 * kCyclesPerConsistent * consistent >= tried) return Verdict::kConfirmed;
-  return tried > 2 ? Verdict::kContradicted : Verdict::kUnknown;
-}
-
-void Consensus::JudgeByShortCycles() {
-  const int num_chunks = (num_edges_ + kEdgesPerChunk - 1) / kEdgesPerChunk;
-  ParallelFor(num_chunks, num_threads_, [&](int chunk) {
-    std::vector<int> mark(static_cast<std::size_t>(problem_.num_views), -1);
-    const int end = std::min(num_edges_, (chunk + 1) * kEdgesPerChunk);
-    for (int edge = chunk * kEdgesPerChunk; edge < end; ++edge) {
-      const Verdict by_triangles = JudgeByTriangles(edge);
-      verdict_[edge] = by_triangles;
-      if (by_triangles == Verdict::kConfirmed) continue;
-      const Verdict by_squares = JudgeBySquares(edge, mark);
-      if (by_squares != Verdict::kUnknown) verdict_[edge] = by_squares;
-    }
-  });
-}
-
 void Consensus::JudgeByStart() {
-  for (int edge = 0; edge < num_edges_; ++edge) {
-    const bool agrees = SquaredResidual(edge) <= Tolerance(problem_.edges[edge].variance);
-    verdict_[edge] = agrees ? Verdict::kConfirmed : Verdict::kUnknown;
+  knowledge_.verdict.resize(problem_.edges.size());
+  for (int edge = 0; edge < graph_.num_edges(); ++edge) {
+    const bool agrees = SquaredResidual(edge) <= graph_.Tolerance(graph_.edge(edge).variance);
+    knowledge_.verdict[edge] = agrees ? EdgeVerdict::kConfirmed : EdgeVerdict::kUnknown;
   }
 }
 
 // What confirmed edges tie together; the held views of a component are one piece.
 void Consensus::FindPieces() {
   DisjointSets sets(problem_.num_views);
-  for (int edge = 0; edge < num_edges_; ++edge) {
-    if (IsConfirmed(edge)) sets.Join(problem_.edges[edge].i, problem_.edges[edge].j);
+  for (int edge = 0; edge < graph_.num_edges(); ++edge) {
+    if (IsConfirmed(edge)) sets.Join(graph_.edge(edge).i, graph_.edge(edge).j);
   }
   std::vector<int> held(static_cast<std::size_t>(problem_.num_views), -1);
   for (int view = 0; view < problem_.num_views; ++view) {
@@ -272,7 +86,8 @@ void Consensus::FindPieces() {
     if (first < 0) first = view;
     sets.Join(first, view);
   }
-  for (int view = 0; view < problem_.num_views; ++view) piece_[view] = sets.Find(view);
+  knowledge_.piece.resize(static_cast<std::size_t>(problem_.num_views));
+  for (int view = 0; view < problem_.num_views; ++view) knowledge_.piece[view] = sets.Find(view);
 }
 
 // The held views; in components without one, the view with the most confirmed edges.
@@ -287,10 +102,9 @@ std::vector<int> Consensus::Roots() const {
       best[component] = -2;
     }
     if (best[component] == -2) continue;
-    const std::span<const Neighbour> neighbours = NeighboursOf(view);
-    const auto confirmed = std::count_if(neighbours.begin(),
-                                         neighbours.end(),
-                                         [&](const Neighbour& n) { return IsConfirmed(n.edge); });
+    const std::span<const ConsensusGraph::Neighbour> neighbours = graph_.NeighboursOf(view);
+    const auto confirmed = std::count_if(
+        neighbours.begin(), neighbours.end(), [&](const auto& n) { return IsConfirmed(n.edge); });
     const std::array<int, 2> here = {static_cast<int>(confirmed),
                                      static_cast<int>(neighbours.size())};
     if (here > score[component]) {
@@ -304,118 +118,51 @@ std::vector<int> Consensus::Roots() const {
   return roots;
 }
 
-void Consensus::Settle(int view, int edge) {
-  Node& node = tree_[view];
-  node.edge = edge;
-  if (edge < 0) {
-    node.jump = view;
-    if (!problem_.has_start && problem_.is_held[view] == 0) {
-      cam_from_world_[view] = Eigen::Quaterniond::Identity();
-    }
-    return;
-  }
-  const ConsensusEdge& e = problem_.edges[edge];
-  node.parent = e.i == view ? e.j : e.i;
-  const Node& parent = tree_[node.parent];
-  const Node& jump = tree_[parent.jump];
-  node.depth = parent.depth + 1;
-  node.jump =
-      parent.depth - jump.depth == jump.depth - tree_[jump.jump].depth ? jump.jump : node.parent;
-  if (!problem_.has_start) {
-    cam_from_world_[view] = (Along(edge, node.parent) * cam_from_world_[node.parent]).normalized();
-  }
-}
-
-// Shortest paths. A piece is entered once: its views lie to each other as confirmed edges say.
-// Trials from the first one on try other unconfirmed edges.
-void Consensus::BuildTree(int trial) {
-  tree_.assign(static_cast<std::size_t>(problem_.num_views), Node{});
-  std::vector<char> is_settled(static_cast<std::size_t>(problem_.num_views), 0);
-  std::vector<char> is_entered(static_cast<std::size_t>(problem_.num_views), 0);
-  std::priority_queue<Candidate, std::vector<Candidate>, std::greater<>> queue;
-  for (const int root : Roots()) queue.emplace(0, 0.0, root, -1);
-  while (!queue.empty()) {
-    const auto [path_class, variance, view, edge] = queue.top();
-    queue.pop();
-    if (is_settled[view] != 0) continue;
-    if (edge >= 0 && !IsConfirmed(edge) && is_entered[piece_[view]] != 0) continue;
-    is_settled[view] = 1;
-    is_entered[piece_[view]] = 1;
-    tree_[view].path_class = path_class;
-    tree_[view].variance = variance;
-    Settle(view, edge);
-    for (const Neighbour& n : NeighboursOf(view)) {
-      if (is_settled[n.view] != 0) continue;
-      const Verdict verdict = verdict_[n.edge];
-      if (verdict != Verdict::kConfirmed && is_entered[piece_[n.view]] != 0) continue;
-      double extra = 0.0;
-      if (verdict != Verdict::kConfirmed) {
-        extra = verdict == Verdict::kUnknown ? kUnconfirmedClass : kContradictedClass;
-        if (trial > 0) extra *= 0.5 + Hash(problem_.seed, trial, n.edge);
-      }
-      queue.emplace(path_class + extra, variance + problem_.edges[n.edge].variance, n.view, n.edge);
-    }
-  }
-}
-
-// -1 when the two hang on different roots.
-int Consensus::CommonAncestor(int a, int b) const {
-  while (tree_[a].depth != tree_[b].depth) {
-    int& deeper = tree_[a].depth > tree_[b].depth ? a : b;
-    const int depth = std::min(tree_[a].depth, tree_[b].depth);
-    const Node& node = tree_[deeper];
-    deeper = tree_[node.jump].depth >= depth ? node.jump : node.parent;
-  }
-  while (a != b) {
-    if (tree_[a].depth == 0) return -1;
-    const bool jumps = tree_[a].jump != tree_[b].jump;
-    a = jumps ? tree_[a].jump : tree_[a].parent;
-    b = jumps ? tree_[b].jump : tree_[b].parent;
-  }
-  return a;
-}
-
-double Consensus::PathVariance(int a, int b) const {
-  const int common = CommonAncestor(a, b);
-  const double to_common = common < 0 ? 0.0 : tree_[common].variance;
-  return problem_.drift_factor * problem_.drift_factor *
-         (tree_[a].variance + tree_[b].variance - 2.0 * to_common);
+// With orientations along it, unless they are given.
+ConsensusTree Consensus::BuildTree(int trial) {
+  ConsensusTree tree(graph_, knowledge_, Roots(), trial);
+  if (!problem_.has_start) tree.Chain(cam_from_world_);
+  return tree;
 }
 
 double Consensus::SquaredResidual(int edge) const {
-  const ConsensusEdge& e = problem_.edges[edge];
+  const ConsensusEdge& e = graph_.edge(edge);
   return SquaredAngle(cam_from_world_[e.j] * cam_from_world_[e.i].conjugate() *
                       e.j_from_i.conjugate());
 }
 
-bool Consensus::Agrees(int edge, bool needs_evidence) const {
-  const ConsensusEdge& e = problem_.edges[edge];
-  const double tolerance = Tolerance(e.variance + PathVariance(e.i, e.j));
+double Consensus::ToleranceIn(const ConsensusTree& tree, int edge) const {
+  const ConsensusEdge& e = graph_.edge(edge);
+  return graph_.Tolerance(e.variance + tree.PathVariance(e.i, e.j));
+}
+
+bool Consensus::Agrees(const ConsensusTree& tree, int edge, bool needs_evidence) const {
+  const double tolerance = ToleranceIn(tree, edge);
   if (needs_evidence && !IsConfirmed(edge) && !IsEvidence(tolerance)) return false;
   return SquaredResidual(edge) <= tolerance;
 }
 
 // Edges outside the tree that agree with it confirm their cycles.
-bool Consensus::ConfirmCycles() {
+bool Consensus::ConfirmCycles(const ConsensusTree& tree) {
   DisjointSets confirmed_up(problem_.num_views);  // named by the view next to the root
   std::vector<int> top(static_cast<std::size_t>(problem_.num_views));
   std::iota(top.begin(), top.end(), 0);
   const auto climb = [&](int view) { return top[confirmed_up.Find(view)]; };
   bool is_new = false;
-  for (int edge = 0; edge < num_edges_; ++edge) {
-    const ConsensusEdge& e = problem_.edges[edge];
-    if (IsConfirmed(edge) || tree_[e.i].edge == edge || tree_[e.j].edge == edge) continue;
-    const double tolerance = Tolerance(e.variance + PathVariance(e.i, e.j));
+  for (int edge = 0; edge < graph_.num_edges(); ++edge) {
+    const ConsensusEdge& e = graph_.edge(edge);
+    if (IsConfirmed(edge) || tree.Has(edge)) continue;
+    const double tolerance = ToleranceIn(tree, edge);
     if (!IsEvidence(tolerance) || SquaredResidual(edge) > tolerance) continue;
-    verdict_[edge] = Verdict::kConfirmed;
+    Confirm(edge);
     is_new = true;
-    const int common = CommonAncestor(e.i, e.j);
-    const int depth = common < 0 ? 0 : tree_[common].depth;
+    const int common = tree.CommonAncestor(e.i, e.j);
+    const int depth = common < 0 ? 0 : tree.DepthOf(common);
     for (const int end : {e.i, e.j}) {
-      for (int view = climb(end); tree_[view].depth > depth; view = climb(view)) {
-        verdict_[tree_[view].edge] = Verdict::kConfirmed;
-        const int above = climb(tree_[view].parent);
-        confirmed_up.Join(view, tree_[view].parent);
+      for (int view = climb(end); tree.DepthOf(view) > depth; view = climb(view)) {
+        Confirm(tree.EdgeAbove(view));
+        const int above = climb(tree.ParentOf(view));
+        confirmed_up.Join(view, tree.ParentOf(view));
         top[confirmed_up.Find(view)] = above;
       }
     }
@@ -424,11 +171,11 @@ bool Consensus::ConfirmCycles() {
 }
 
 // Edges between two pieces that agree on how these lie to each other.
-bool Consensus::ConfirmByVotes() {
+bool Consensus::ConfirmByVotes(const ConsensusTree& tree) {
   std::vector<std::tuple<int, int, int>> between;  // piece, piece, edge
-  for (int edge = 0; edge < num_edges_; ++edge) {
-    const int a = piece_[problem_.edges[edge].i];
-    const int b = piece_[problem_.edges[edge].j];
+  for (int edge = 0; edge < graph_.num_edges(); ++edge) {
+    const int a = knowledge_.piece[graph_.edge(edge).i];
+    const int b = knowledge_.piece[graph_.edge(edge).j];
     if (a != b) between.emplace_back(std::min(a, b), std::max(a, b), edge);
   }
   std::sort(between.begin(), between.end());
@@ -442,13 +189,13 @@ bool Consensus::ConfirmByVotes() {
          ++end) {
       edges.push_back(std::get<2>(between[end]));
     }
-    if (edges.size() > 1) is_new |= ConfirmVotes(edges);
+    if (edges.size() > 1) is_new |= ConfirmVotes(tree, edges);
     begin = end;
   }
   return is_new;
 }
 
-bool Consensus::ConfirmVotes(std::vector<int>& edges) {
+bool Consensus::ConfirmVotes(const ConsensusTree& tree, std::vector<int>& edges) {
   if (edges.size() > kMaxVotes) edges.resize(kMaxVotes);
   struct Vote {
     int low;  // the edge's end in the piece of the lower number
@@ -458,16 +205,17 @@ bool Consensus::ConfirmVotes(std::vector<int>& edges) {
   std::vector<Vote> votes;
   votes.reserve(edges.size());
   for (const int edge : edges) {
-    const ConsensusEdge& e = problem_.edges[edge];
+    const ConsensusEdge& e = graph_.edge(edge);
     const Eigen::Quaterniond turn =
         cam_from_world_[e.j].conjugate() * e.j_from_i * cam_from_world_[e.i];
-    const bool flipped = piece_[e.i] > piece_[e.j];
+    const bool flipped = knowledge_.piece[e.i] > knowledge_.piece[e.j];
     votes.push_back({flipped ? e.j : e.i, flipped ? e.i : e.j, flipped ? turn.conjugate() : turn});
   }
   const auto agree = [&](std::size_t a, std::size_t b) {
-    const double tolerance = Tolerance(
-        problem_.edges[edges[a]].variance + problem_.edges[edges[b]].variance +
-        PathVariance(votes[a].low, votes[b].low) + PathVariance(votes[a].high, votes[b].high));
+    const double tolerance =
+        graph_.Tolerance(graph_.edge(edges[a]).variance + graph_.edge(edges[b]).variance +
+                         tree.PathVariance(votes[a].low, votes[b].low) +
+                         tree.PathVariance(votes[a].high, votes[b].high));
     return IsEvidence(tolerance) &&
            SquaredAngle(votes[a].turn.conjugate() * votes[b].turn) <= tolerance;
   };
@@ -485,26 +233,60 @@ bool Consensus::ConfirmVotes(std::vector<int>& edges) {
     return false;
   }
   for (std::size_t b = 0; b < votes.size(); ++b) {
-    if (b == best || agree(best, b)) verdict_[edges[b]] = Verdict::kConfirmed;
+    if (b == best || agree(best, b)) Confirm(edges[b]);
   }
   return true;
 }
 
-void Consensus::ConfirmByTrees() {
-  const int max_vain =
-      std::clamp(static_cast<int>(kVainTreeEdges / num_edges_), kMinVainTrees, kMaxVainTrees);
+void Consensus::ConfirmByTrees(int first_trial) {
+  const int max_vain = std::clamp(
+      static_cast<int>(kVainTreeEdges / graph_.num_edges()), kMinVainTrees, kMaxVainTrees);
   int vain = 0;
-  for (int trial = 0; vain < max_vain; ++trial) {
-    BuildTree(trial);
-    const bool by_cycles = ConfirmCycles();
+  for (int trial = first_trial; vain < max_vain; ++trial) {
+    const ConsensusTree tree = BuildTree(trial);
+    const bool by_cycles = ConfirmCycles(tree);
     if (by_cycles) FindPieces();
-    const bool by_votes = ConfirmByVotes();
+    const bool by_votes = ConfirmByVotes(tree);
     if (by_votes) FindPieces();
     vain = by_cycles || by_votes ? 0 : vain + 1;
-    const bool is_one =
-        std::all_of(piece_.begin(), piece_.end(), [&](int piece) { return piece == piece_[0]; });
-    if (is_one) break;
+    const std::vector<int>& piece = knowledge_.piece;
+    if (std::all_of(piece.begin(), piece.end(), [&](int one) { return one == piece[0]; })) break;
   }
+}
+
+// Among many long cycles of wrong edges some close by chance, and what they confirm stays. Other
+// trees, which go other ways, then have fewer edges against them.
+void Consensus::ConfirmByBestTrees() {
+  if (graph_.num_edges() == 0) return;
+  const int max_beginnings =
+      std::min(static_cast<int>(kBeginningEdges / graph_.num_edges()), kMaxBeginnings);
+  if (max_beginnings < 2) {
+    ConfirmByTrees(0);
+    return;
+  }
+  const EdgeKnowledge by_short_cycles = knowledge_;
+  EdgeKnowledge best;
+  double least_doubt = std::numeric_limits<double>::infinity();
+  for (int k = 0; k < max_beginnings && least_doubt > kLittleDoubt; ++k) {
+    knowledge_ = by_short_cycles;
+    ConfirmByTrees(k * kTrialsPerBeginning);
+    const double doubt = DoubtOf(BuildTree(0));
+    if (doubt >= least_doubt) continue;
+    least_doubt = doubt;
+    best = knowledge_;
+  }
+  knowledge_ = std::move(best);
+}
+
+// Share of the edges that contradict a tree, those that are only inaccurate counted in part.
+double Consensus::DoubtOf(const ConsensusTree& tree) const {
+  constexpr double kLeastTolerance = kLargestEvidence_rad * kLargestEvidence_rad;
+  double sum = 0.0;
+  for (int edge = 0; edge < graph_.num_edges(); ++edge) {
+    const double tolerance = std::max(kLeastTolerance, ToleranceIn(tree, edge));
+    sum += std::min(1.0, SquaredResidual(edge) / tolerance);
+  }
+  return sum / graph_.num_edges();
 }
 
 ConsensusStart Consensus::Find() {
@@ -512,19 +294,20 @@ ConsensusStart Consensus::Find() {
     JudgeByStart();
     FindPieces();
   } else {
-    JudgeByShortCycles();
+    knowledge_.verdict = JudgeByShortCycles(graph_, num_threads_);
     FindPieces();
-    ConfirmByTrees();
+    ConfirmByBestTrees();
   }
-  BuildTree(0);
+  const ConsensusTree tree = BuildTree(0);
   ConsensusStart start;
   start.is_trusted.resize(problem_.edges.size());
   // Where cycles are short enough to tell right from wrong, long ones that prove nothing are not
   // believed.
-  const auto confirmed = std::count(verdict_.begin(), verdict_.end(), Verdict::kConfirmed);
-  const bool cycles_tell = !problem_.has_start && 2 * confirmed > num_edges_;
-  for (int edge = 0; edge < num_edges_; ++edge) {
-    start.is_trusted[edge] = Agrees(edge, cycles_tell) ? 1 : 0;
+  const auto confirmed =
+      std::count(knowledge_.verdict.begin(), knowledge_.verdict.end(), EdgeVerdict::kConfirmed);
+  const bool cycles_tell = !problem_.has_start && 2 * confirmed > graph_.num_edges();
+  for (int edge = 0; edge < graph_.num_edges(); ++edge) {
+    start.is_trusted[edge] = Agrees(tree, edge, cycles_tell) ? 1 : 0;
   }
   start.roots = Roots();
   start.cam_from_world = std::move(cam_from_world_);

@@ -48,10 +48,13 @@ struct ConsensusStart {
 /// 2. A tree of shortest paths over as few unconfirmed edges as possible, then of least variance.
 /// 3. An edge outside the tree that agrees with it confirms its whole cycle; and where several
 ///    edges between two confirmed pieces agree on how the pieces lie to each other, they are
-///    confirmed. Back to 2 until nothing new is.
+///    confirmed. Back to 2 until nothing new is, other unconfirmed edges tried at random.
+/// 4. Where many edges contradict the outcome, 2 and 3 are begun anew with other trees, and the one
+///    that fewest contradict is kept.
 ///
 /// Every piece of the graph without a held view gets a root of its own at the identity.
-/// Cost:    O(E log E) a round for E edges, some five rounds; cycles O(E degree^2) at most.
+/// Cost:    O(E log E) a round for E edges, some five rounds, up to five times that below 10,000
+///          edges; cycles O(E degree^2) at most.
 /// Source:  the idea of confirming by cycles is Zach et al., Disambiguating Visual Relations Using
 ///          Loop Constraints, CVPR 2010; pieces and votes between them are ours.
 ConsensusStart FindConsensusStart(const ConsensusProblem& problem, int num_threads);

@@ -272,7 +272,7 @@ GlobalAveragingResult AverageGlobally(const GlobalAveragingProblem& problem,
   return result;
 }
 
-GlobalAveragingResult CloseLoops(const ViewGraph& graph,
+GlobalAveragingResult CloseLoops(std::span<const RelativeRotation> edges,
                                  const RotationMap& cam_from_world,
                                  const AveragingOptions& options,
                                  int num_threads) {
@@ -280,7 +280,7 @@ GlobalAveragingResult CloseLoops(const ViewGraph& graph,
     throw std::invalid_argument("AveragingOptions: " + *found);
   }
   GlobalAveragingProblem problem;
-  problem.edges = graph.edges();
+  problem.edges = edges;
   problem.cam_from_world = cam_from_world;
   if (!cam_from_world.empty()) problem.held_views = {cam_from_world.begin()->first};
   GlobalAveragingOptions global;

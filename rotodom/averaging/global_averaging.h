@@ -105,9 +105,10 @@ GlobalAveragingResult AverageGlobally(const GlobalAveragingProblem& problem,
 /// edges between its past and its present: all views are turned, the first one held. A loop is
 /// adopted when it disagrees by no more than the drift that the edges on the way let expect,
 /// however many deviations of its own that is.
+/// @param edges           of the view-graph.
 /// @param cam_from_world  start, of all views of the edges.
 /// Cost:    tens of milliseconds for some thousand views.
-GlobalAveragingResult CloseLoops(const ViewGraph& graph,
+GlobalAveragingResult CloseLoops(std::span<const RelativeRotation> edges,
                                  const RotationMap& cam_from_world,
                                  const AveragingOptions& options,
                                  int num_threads);

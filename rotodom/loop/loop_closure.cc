@@ -53,6 +53,12 @@ std::vector<std::array<int, 2>> MatchesOfFeatures(const std::vector<std::array<i
   return matches;
 }
 
+// Throws std::invalid_argument when an option is out of range.
+const LoopOptions& Checked(const LoopOptions& options) {
+  if (const auto problem = options.Problem()) throw std::invalid_argument("loop: " + *problem);
+  return options;
+}
+
 }  // namespace
 
 std::optional<std::string> LoopOptions::Problem() const {
@@ -62,6 +68,7 @@ std::optional<std::string> LoopOptions::Problem() const {
   if (!(min_correction_deg >= 0.0)) {
     return OutOfRange("min_correction_deg", min_correction_deg, "zero or more");
   }
+  if (handover_frames < 0) return OutOfRange("handover_frames", handover_frames, "zero or more");
   if (!(max_shutter_error_deg > 0.0)) {
     return OutOfRange("max_shutter_error_deg", max_shutter_error_deg, "above 0");
   }
@@ -81,30 +88,23 @@ LoopClosure::LoopClosure(const Camera& camera,
                          std::uint64_t seed,
                          int num_threads)
     : camera_(camera),
-      options_(options),
+      options_(Checked(options)),
       feature_options_(odometry.features),
       tools_{odometry.matching, odometry.relative_rotation, seed, num_threads},
       vocabulary_(std::move(vocabulary)),
-      finder_(vocabulary_->num_words(), options.candidates) {
-  if (const auto problem = options.Problem()) throw std::invalid_argument("loop: " + *problem);
-}
+      finder_(vocabulary_->num_words(), options.candidates) {}
 
 LoopReport LoopClosure::AddFrame(const FrameEstimate& estimate,
                                  const cv::Mat& image,
-                                 const RotationMap& cam_from_world) {
+                                 const RotationMap& cam_from_world,
+                                 const DisjointSets& pieces) {
   timestamps_s_[estimate.frame] = estimate.timestamp_s;
-  LoopReport report = Finish(cam_from_world);
-  // A handful of matches may agree by chance: no way that is known.
-  if (!estimate.report.weak) {
-    for (const Connection& connection : estimate.connections) {
-      pieces_.Join(connection.edge.i, estimate.frame);
-    }
-  }
+  LoopReport report = Finish(cam_from_world, pieces);
   if (IsNewPlace(estimate)) pending_ = Describe(estimate, image);
   return report;
 }
 
-LoopReport LoopClosure::Finish(const RotationMap& cam_from_world) {
+LoopReport LoopClosure::Finish(const RotationMap& cam_from_world, const DisjointSets& pieces) {
   if (!pending_) return {};
   PendingPlace pending = *std::move(pending_);
   pending_.reset();
@@ -117,11 +117,11 @@ LoopReport LoopClosure::Finish(const RotationMap& cam_from_world) {
   const std::size_t count =
       std::min(candidates.size(), static_cast<std::size_t>(options_.max_candidates));
   for (std::size_t k = 0; k < count && report.connections.empty(); ++k) {
-    report.checks.push_back(Verify(place, candidates[k], cam_from_world, report.connections));
+    report.checks.push_back(
+        Verify(place, candidates[k], cam_from_world, pieces, report.connections));
   }
   for (const Connection& connection : report.connections) {
     finder_.Join(connection.edge.i, frame);
-    pieces_.Join(connection.edge.i, frame);
   }
   places_.emplace(frame, std::move(place));
   return report;
@@ -199,6 +199,7 @@ std::vector<LoopCandidate> LoopClosure::FindCandidates(const Place& place) {
 LoopCheck LoopClosure::Verify(const Place& place,
                               const LoopCandidate& candidate,
                               const RotationMap& cam_from_world,
+                              const DisjointSets& pieces,
                               std::vector<Connection>& connections) {
   const Stopwatch stopwatch(seconds_.verification);
   const FrameId frame = place.corners.frame;
@@ -211,7 +212,7 @@ LoopCheck LoopClosure::Verify(const Place& place,
                                      old_places,
                                      cam_from_world,
                                      candidate.num_consistent,
-                                     pieces_.Of(candidate.frame) == pieces_.Of(frame),
+                                     pieces.Find(candidate.frame.value) == pieces.Find(frame.value),
                                      camera_,
                                      options_.verification,
                                      tools_);

@@ -10,10 +10,10 @@
 #include <opencv2/core.hpp>
 
 #include "rotodom/loop/candidates.h"
-#include "rotodom/loop/pieces.h"
 #include "rotodom/loop/verification.h"
 #include "rotodom/loop/vocabulary.h"
 #include "rotodom/odometry.h"
+#include "rotodom/types/disjoint_sets.h"
 
 namespace rotslam {
 
@@ -29,6 +29,10 @@ struct LoopOptions {
   // A loop that turns the present orientation by less than this waits for the next one, or for the
   // end, before all orientations are averaged.
   double min_correction_deg = 0.2;
+  // They are averaged beside the stream and taken over this many frames after the loop: long enough
+  // for some thousand frames at the pace of a camera. 0: at once, the stream waits. It also waits
+  // where there is one thread.
+  int handover_frames = 5;
   // A place sees the same scene as another when they have this many points in common.
   int min_common_points = 15;
   // Candidates that are verified for one place, and places around each that are asked as well.
@@ -45,6 +49,7 @@ struct LoopOptions {
     visit("place_overlap", place_overlap);
     visit("max_shutter_error_deg", max_shutter_error_deg);
     visit("min_correction_deg", min_correction_deg);
+    visit("handover_frames", handover_frames);
     visit("min_common_points", min_common_points);
     visit("max_candidates", max_candidates);
     visit("max_neighbours", max_neighbours);
@@ -96,12 +101,14 @@ class LoopClosure {
   /// only now is the rate of its rotation known, which a rolling shutter needs.
   /// @param image           the frame's.
   /// @param cam_from_world  present orientations of all frames so far.
+  /// @param pieces          by frame: inside one, orientations are linked by edges.
   LoopReport AddFrame(const FrameEstimate& estimate,
                       const cv::Mat& image,
-                      const RotationMap& cam_from_world);
+                      const RotationMap& cam_from_world,
+                      const DisjointSets& pieces);
 
   /// After the last frame: what became of that.
-  LoopReport Finish(const RotationMap& cam_from_world);
+  LoopReport Finish(const RotationMap& cam_from_world, const DisjointSets& pieces);
 
   int num_places() const { return static_cast<int>(places_.size()); }
   const LoopSeconds& seconds() const { return seconds_; }
@@ -131,6 +138,7 @@ class LoopClosure {
   LoopCheck Verify(const Place& place,
                    const LoopCandidate& candidate,
                    const RotationMap& cam_from_world,
+                   const DisjointSets& pieces,
                    std::vector<Connection>& connections);
 
   Camera camera_;
@@ -140,7 +148,6 @@ class LoopClosure {
   std::shared_ptr<const Vocabulary> vocabulary_;
   CandidateFinder finder_;
   std::map<FrameId, Place> places_;
-  Pieces pieces_;
   std::optional<PendingPlace> pending_;
   std::map<FrameId, double> timestamps_s_;
   LoopSeconds seconds_;

@@ -78,7 +78,7 @@ void BM_CloseLoops(benchmark::State& state) {
   }
   GlobalAveragingResult result;
   for (auto _ : state) {
-    result = CloseLoops(scene.graph, scene.chained_cam_from_world, {}, kNumThreads);
+    result = CloseLoops(scene.graph.edges(), scene.chained_cam_from_world, {}, kNumThreads);
     benchmark::DoNotOptimize(result);
   }
   state.counters["edges"] = static_cast<double>(scene.graph.edges().size());

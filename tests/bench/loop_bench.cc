@@ -1,17 +1,22 @@
-// Time of visual words beside what they give: transform, query, loading, memory.
+// Time of visual words beside what they give: transform, query, loading, memory; and how long loops
+// hold up a stream.
 #include <algorithm>
+#include <chrono>
 #include <cmath>
 #include <filesystem>
 #include <map>
 #include <random>
+#include <thread>
 #include <vector>
 
 #include <benchmark/benchmark.h>
 
 #include "rotodom/loop/default_vocabulary.h"
+#include "rotodom/loop/looped_orientations.h"
 #include "rotodom/loop/place_database.h"
 #include "rotodom/loop/vocabulary_file.h"
 #include "tests/rotodom/loop/random_vocabulary.h"
+#include "tests/scenes/rotation_graph.h"
 
 namespace rotslam {
 namespace {
@@ -137,6 +142,73 @@ void BM_LoadBinary(benchmark::State& state) {
   state.counters["bytes"] = static_cast<double>(bytes.size());
 }
 
+constexpr int kFramesPerLoop = 500;
+
+// Frames as an odometry would give them, at 30 per second while orientations are averaged; every
+// 500th leads back to the first ones.
+void BM_Stream(benchmark::State& state) {
+  constexpr std::chrono::milliseconds kPeriod(33);
+  const int num_frames = static_cast<int>(state.range(0));
+  const RotationGraph scene =
+      MakeRotationGraph({.num_views = num_frames, .keyframe_every = 8, .noise_deg = 0.02});
+  LoopOptions options;
+  options.handover_frames = static_cast<int>(state.range(1));
+  double longest_s = 0.0;
+  double averaging_s = 0.0;
+  RotationMap averaged;
+  int num_moved = 0;
+  for (auto _ : state) {
+    LoopedOrientations orientations({}, options, false, 2);
+    for (int k = 0; k < num_frames; ++k) {
+      FrameEstimate estimate;
+      estimate.frame = FrameId{k};
+      for (const int index : scene.graph.EdgesOf(estimate.frame)) {
+        const RelativeRotation& edge = scene.graph.edges()[index];
+        if (edge.j == estimate.frame) estimate.connections.push_back({edge, {}, {}});
+      }
+      for (int view = std::max(0, k - 9); view <= k; ++view) {
+        estimate.window[FrameId{view}] = scene.chained_cam_from_world.at(FrameId{view});
+      }
+      std::vector<Connection> loop;
+      const int since_loop = k % kFramesPerLoop;
+      if (since_loop == 0 && k > 0) {
+        RelativeRotation edge;
+        edge.i = FrameId{k / kFramesPerLoop};
+        edge.j = estimate.frame;
+        edge.j_from_i =
+            scene.true_cam_from_world.at(edge.j) * scene.true_cam_from_world.at(edge.i).Inverse();
+        edge.covariance = 1e-7 * Eigen::Matrix3d::Identity();
+        loop.push_back({edge, {}, {}});
+      }
+      const auto start = std::chrono::steady_clock::now();
+      orientations.BeginFrame(estimate);
+      orientations.AddFrame(std::move(estimate));
+      orientations.AddLoop(std::move(loop));
+      num_moved += orientations.EndFrame() ? 1 : 0;
+      const std::chrono::duration<double> passed = std::chrono::steady_clock::now() - start;
+      longest_s = std::max(longest_s, passed.count());
+      if (k >= kFramesPerLoop && since_loop < options.handover_frames) {
+        std::this_thread::sleep_until(start + kPeriod);
+      }
+    }
+    averaging_s = orientations.averaging_seconds() / num_moved;
+    averaged = orientations.result().cam_from_world;
+  }
+  state.counters["edges"] = static_cast<double>(scene.graph.edges().size());
+  state.counters["longest_ms"] = 1e3 * longest_s;
+  state.counters["averaging_ms"] = 1e3 * averaging_s;
+  state.counters["averagings"] = num_moved;
+  state.counters["rms_deg_chained"] =
+      CompareRotations(scene.chained_cam_from_world, scene.true_cam_from_world).rms_deg;
+  state.counters["rms_deg"] = CompareRotations(averaged, scene.true_cam_from_world).rms_deg;
+}
+
+BENCHMARK(BM_Stream)
+    ->ArgNames({"frames", "handover"})
+    ->ArgsProduct({{1600, 4600, 10100}, {0, 5}})
+    ->Iterations(1)
+    ->UseRealTime()
+    ->Unit(benchmark::kMillisecond);
 BENCHMARK(BM_Transform)->ArgName("levels_up")->Arg(0)->Arg(3)->Unit(benchmark::kMicrosecond);
 BENCHMARK(BM_Query)->ArgName("frames")->Arg(1000)->Arg(10000)->Unit(benchmark::kMicrosecond);
 BENCHMARK(BM_AddFrame)->Unit(benchmark::kMicrosecond);

@@ -72,8 +72,7 @@ double ShareFound(const RotationMap& estimate, const RotationMap& truth) {
 
 // Views with fewer than two right edges, and pieces that only such edges tie to the rest, cannot be
 // told: on these graphs that leaves 98 % to find among random edges at 40 %, 82 % on the grid at 30
-// % and 99 % on the chain at 40 %. On the grid at 30 % four of 30 runs over other seeds found less,
-// 45 to 68 %.
+// % and 99 % on the chain at 40 %.
 TEST(AverageGlobally, LadderOfWrongEdges) {
   struct Rung {
     GraphShape shape;
@@ -108,6 +107,17 @@ TEST(AverageGlobally, LadderOfWrongEdges) {
       EXPECT_LT(CompareOrientations(result.cam_from_world, scene.true_cam_from_world).median_deg,
                 rung.median_deg);
     }
+  }
+}
+
+// With these seeds long cycles of wrong edges close by chance, and the first trees believe them: 41
+// to 67 % found. Of 100 seeds the worst finds 79 %.
+TEST(AverageGlobally, BeginsAnewWhereChanceClosesCycles) {
+  for (const std::uint64_t seed : {9, 11, 12, 24, 34, 36, 52, 67}) {
+    const WrongEdges scene =
+        MakeWrongEdges({.shape = GraphShape::kGrid, .wrong_ratio = 0.3, .seed = seed});
+    const GlobalAveragingResult result = Average(scene.edges);
+    EXPECT_GE(ShareFound(result.cam_from_world, scene.true_cam_from_world), 0.78) << seed;
   }
 }
 
@@ -311,7 +321,7 @@ TEST(CloseLoops, AdoptsRightLoopsAgainstDriftAndRefusesAFalseOne) {
     return (estimate.at(edge.j) * estimate.at(edge.i).Inverse() * edge.j_from_i.Inverse())
         .AngleDeg();
   };
-  const GlobalAveragingResult result = CloseLoops(scene.graph, scene.chained, {}, 2);
+  const GlobalAveragingResult result = CloseLoops(scene.graph.edges(), scene.chained, {}, 2);
   double largest_drift = 0.0;
   for (std::size_t k = num_chain_edges; k < scene.graph.edges().size(); ++k) {
     const RelativeRotation& edge = scene.graph.edges()[k];
@@ -334,7 +344,7 @@ TEST(CloseLoops, LeavesADriftThatOnlyAFalseLoopContradicts) {
   Drifted scene = MakeDrifted();
   std::mt19937_64 random(3);
   AddLoop(scene, 100, 1900, 20.0, random);
-  const GlobalAveragingResult result = CloseLoops(scene.graph, scene.chained, {}, 2);
+  const GlobalAveragingResult result = CloseLoops(scene.graph.edges(), scene.chained, {}, 2);
   const double before = CompareOrientations(scene.chained, scene.truth).max_deg;
   EXPECT_LT(CompareOrientations(result.cam_from_world, scene.truth).max_deg, 1.5 * before + 0.1);
 }

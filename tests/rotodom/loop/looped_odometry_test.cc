@@ -262,14 +262,23 @@ TEST(LoopedOdometry, KnowsEveryFramesCovariance) {
 }
 
 TEST(LoopedOdometry, RefusesOptionsOutOfRange) {
+  const auto message = [](const LoopOptions& options) -> std::string {
+    try {
+      const LoopedOdometry odometry(SmallCamera(), {}, options, nullptr, false, 1, 1);
+    } catch (const std::invalid_argument& error) {
+      return error.what();
+    }
+    return "";
+  };
   LoopOptions options;
   options.verification.min_inliers = 0;
-  try {
-    const LoopedOdometry odometry(SmallCamera(), {}, options, nullptr, false, 1, 1);
-    FAIL();
-  } catch (const std::invalid_argument& error) {
-    EXPECT_EQ(std::string(error.what()), "loop: verification.min_inliers is 0, must be at least 1");
-  }
+  EXPECT_EQ(message(options), "loop: verification.min_inliers is 0, must be at least 1");
+  options = {};
+  options.candidates.group_size = -1;
+  EXPECT_EQ(message(options), "loop: candidates.group_size is -1, must be zero or more");
+  options = {};
+  options.handover_frames = -1;
+  EXPECT_EQ(message(options), "loop: handover_frames is -1, must be zero or more");
 }
 
 }  // namespace
