@@ -399,6 +399,22 @@ TEST(ScaleTurns, SaysNothingOfAStraightWay) {
   EXPECT_NEAR(way.angle_deg, 0.02 * kDegFromRad, 1e-9);
 }
 
+TEST(VerifyLoop, ARollingShutterMakesEdgesLessCertain) {
+  Case c = TruePlace();
+  const LoopEvidence global = c.Verify();
+  c.scene.camera.readout_s = 0.02;
+  const LoopEvidence rolling = c.Verify();
+  ASSERT_TRUE(global.accepted && rolling.accepted);
+  ASSERT_EQ(ConnectedFrames(rolling), ConnectedFrames(global));
+  const double sigma = c.options.shutter_sigma_deg * kRadFromDeg;
+  const Eigen::Matrix3d added = sigma * sigma * Eigen::Matrix3d::Identity();
+  for (std::size_t k = 0; k < global.connections.size(); ++k) {
+    const Eigen::Matrix3d difference =
+        rolling.connections[k].edge.covariance - global.connections[k].edge.covariance;
+    EXPECT_TRUE(difference.isApprox(added, 1e-9));
+  }
+}
+
 TEST(VerifyLoop, RefusesUncertainEdges) {
   Case c = TruePlace();
   const LoopEvidence evidence = c.Verify();
