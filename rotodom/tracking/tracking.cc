@@ -22,7 +22,7 @@ constexpr double kSamePointPx = 1.0;
 // Smaller turns leave a patch as it is.
 constexpr double kTurnThatShowsDeg = 1.0;
 // Less flow beside the turn leaves it so, too.
-constexpr double kFlowThatShowsPx = 0.5;
+constexpr double kFlowThatShowsPx = 2.0;
 // Distance from the epipole, in focal lengths, of a point whose patch is stretched and sheared as
 // much as is usual: by flow over distance.
 constexpr double kDepthScale = 0.15;
