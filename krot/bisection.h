@@ -20,8 +20,8 @@ struct BisectionProgress {
 
 struct BisectionOptions {
   // "interior": our own interior-point programs over the few points that hold the optimum, the LP
-  // engine where they stall. "programs": the LP engine alone, over all points; some fifty times the
-  // time and memory, and no code in common but the proofs.
+  // engine where they stall. "programs": the LP engine alone, over all points; ten to a hundred
+  // times the time and memory, and no code in common but the proofs.
   std::string method = "interior";
   // Stop when gamma_high - gamma_low <= relative_gap * gamma_high. 1e-2 is what a start for bundle
   // adjustment needs; the linear programs stop telling the sides apart near 1e-4.
