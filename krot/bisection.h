@@ -91,7 +91,8 @@ struct BisectionResult {
 ///          long, and the triangulation of the other points that miss. Gap 1e-2 on streets of 6.4
 ///          views a point, CPU s of one thread: 20 views and 1,000 points 0.05; 100 and 5,000 0.3;
 ///          200 and 20,000 0.8; 500 and 30,000 2 to 4.5; 1,000 and 100,000 15 (111 MB). 172 views
-///          around 14,828 points 3 to 7. Gap 1e-3 takes up to twice that.
+///          around 14,828 points 3 to 7. That is the observations to the power 1.2; gap 1e-3 takes
+///          up to twice that.
 /// Source:  Kahl & Hartley, Multiple-View Geometry under the L-infinity Norm, PAMI 2008; ours
 ///          bounds |dx| and |dy| apart, steps as Crouzeix, Ferland & Schaible instead of halving,
 ///          adds the observations that miss the bound, and accepts a lower bound only with a

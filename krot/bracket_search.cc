@@ -106,7 +106,8 @@ class Search {
   // The first structure: the caller's or that of the easiest programs.
   bool Begin(const MinimaxStructure* start) {
     if (start != nullptr) TakeStart(*start);
-    for (double gamma = 0.1; part_high_ == kInfinity && gamma < 1000.0; gamma *= 10.0) {
+    // A start that misses by more than these do is worse than none.
+    for (double gamma = 0.1; part_high_ > 2.0 * gamma && gamma < 1000.0; gamma *= 10.0) {
       const InteriorResult first = interior_->FindFeasible(gamma, {});
       ++bracket_.num_programs;
       Take(first.structure);
@@ -394,6 +395,10 @@ Bracket SearchBracket(const MinimaxProblem& problem,
                       const MinimaxStructure* start) {
   Bracket bracket;
   Search(problem, options, limits, bracket).Run(start);
+  if (start != nullptr && bracket.status == BisectionStatus::kIterationLimit) {
+    // Degenerate starts lead astray; what they gave is kept.
+    Search(problem, options, limits, bracket).Run(nullptr);
+  }
   return bracket;
 }
 

@@ -1,5 +1,6 @@
 #include "krot/bisection.h"
 
+#include <limits>
 #include <set>
 #include <stdexcept>
 
@@ -288,6 +289,20 @@ TEST(MinimiseMaxResidual, IsNeverWorseThanItsStart) {
     if (way.lp.engine == LpEngine::kGlpk) continue;
     way.max_programs = 1;
     EXPECT_LE(MinimiseMaxResidual(problem, way, &start).gamma_high, before * (1.0 + 1e-12));
+  }
+}
+
+TEST(MinimiseMaxResidual, AStartThatIsNoStructureDoesNoHarm) {
+  const MinimaxProblem problem = NoisyRing(6, 40);
+  MinimaxStructure start;
+  start.center_in_world.assign(problem.num_views(), Eigen::Vector3d::Zero());
+  start.point_in_world.assign(problem.num_points, Eigen::Vector3d::Zero());
+  for (const bool finite : {true, false}) {
+    if (!finite) start.center_in_world[2].x() = std::numeric_limits<double>::quiet_NaN();
+    if (!finite) start.point_in_world[3].y() = std::numeric_limits<double>::quiet_NaN();
+    for (const BisectionOptions& way : AllWays()) {
+      EXPECT_EQ(MinimiseMaxResidual(problem, way, &start).status, BisectionStatus::kConverged);
+    }
   }
 }
 
