@@ -1,70 +1,138 @@
 #include "krot/bisection.h"
 
+#include <algorithm>
+#include <chrono>
 #include <cmath>
 #include <stdexcept>
 #include <utility>
-#include <vector>
 
+#include "krot/bracket_search.h"
+#include "krot/working_set.h"
 #include "rotodom/types/options.h"
 
 namespace rotslam {
 namespace {
 
-// The slack the infeasible programs needed, nearly linear in gamma close to the optimum.
-struct Miss {
-  double gamma;
-  double slack;
-};
-
-// Where the slack of the last two misses runs out, when that lies inside the bracket.
-std::optional<double> PredictOptimum(const BisectionResult& bracket,
-                                     const std::vector<Miss>& misses) {
-  if (misses.size() < 2) return std::nullopt;
-  const Miss& a = misses[misses.size() - 2];
-  const Miss& b = misses.back();
-  if (!(a.slack > b.slack) || !(b.gamma > a.gamma)) return std::nullopt;
-  const double optimum = b.gamma + b.slack * (b.gamma - a.gamma) / (a.slack - b.slack);
-  if (!(optimum > bracket.gamma_low) || !(optimum < bracket.gamma_high)) return std::nullopt;
-  return optimum;
+double Depth(const MinimaxProblem& problem,
+             const MinimaxStructure& structure,
+             const ImageObservation& observation) {
+  return problem.R_c_w[observation.view].row(2).dot(structure.point_in_world[observation.point] -
+                                                    structure.center_in_world[observation.view]);
 }
 
-// Where to try next inside (low, high): just above the predicted optimum, then just below it; the
-// middle without a prediction, in ratio once both ends are known, and off the middle after an
-// undecided answer, each time by another fraction.
-double NextGamma(const BisectionResult& bracket,
-                 const std::vector<Miss>& misses,
-                 int undecided_in_a_row,
-                 double relative_gap) {
-  static constexpr double kFractions[] = {0.5, 0.35, 0.65, 0.2, 0.8, 0.1, 0.9};
-  if (undecided_in_a_row == 0) {
-    if (const auto optimum = PredictOptimum(bracket, misses)) {
-      const double above = *optimum * (1.0 + 0.4 * relative_gap);
-      const double below = *optimum * (1.0 - 0.4 * relative_gap);
-      if (above < bracket.gamma_high) return above;
-      if (below > bracket.gamma_low) return below;
-    }
+MinimaxStructure Restrict(const MinimaxStructure& structure, const SubProblem& part) {
+  MinimaxStructure restricted;
+  restricted.center_in_world.reserve(part.views.size());
+  restricted.point_in_world.reserve(part.points.size());
+  for (const int view : part.views) {
+    restricted.center_in_world.push_back(structure.center_in_world[view]);
   }
-  const double fraction = kFractions[undecided_in_a_row % 7];
-  if (bracket.gamma_low <= 0.0) return fraction * bracket.gamma_high;
-  return bracket.gamma_low * std::pow(bracket.gamma_high / bracket.gamma_low, fraction);
+  for (const int point : part.points) {
+    restricted.point_in_world.push_back(structure.point_in_world[point]);
+  }
+  return restricted;
 }
 
-bool Narrow(const BisectionResult& bracket, const BisectionOptions& options) {
-  return bracket.gamma_high <= options.zero_gamma ||
-         bracket.gamma_high - bracket.gamma_low <= options.relative_gap * bracket.gamma_high;
+// First centre at the origin, smallest depth one.
+void Enter(const SubProblem& part, const MinimaxStructure& found, MinimaxStructure& structure) {
+  double least = kInfinity;
+  for (const ImageObservation& observation : part.problem.observations) {
+    least = std::min(least, Depth(part.problem, found, observation));
+  }
+  const double scale = 1.0 / least;
+  const Eigen::Vector3d origin = found.center_in_world.front();
+  for (std::size_t k = 0; k < part.views.size(); ++k) {
+    structure.center_in_world[part.views[k]] = scale * (found.center_in_world[k] - origin);
+  }
+  for (std::size_t k = 0; k < part.points.size(); ++k) {
+    structure.point_in_world[part.points[k]] = scale * (found.point_in_world[k] - origin);
+  }
 }
 
-void Offer(const MinimaxProblem& problem, MinimaxStructure structure, BisectionResult& bracket) {
-  if (structure.point_in_world.empty()) return;
-  const double residual = MaxBoxResidual(problem, structure);
-  if (residual >= bracket.gamma_high) return;
-  bracket.gamma_high = residual;
-  bracket.structure = std::move(structure);
+// Points seen once lie on their ray, at depth one.
+void PlaceFreePoints(const MinimaxProblem& problem, MinimaxStructure& structure) {
+  std::vector<int> count(problem.num_points, 0);
+  for (const ImageObservation& observation : problem.observations) ++count[observation.point];
+  for (const ImageObservation& observation : problem.observations) {
+    if (count[observation.point] != 1) continue;
+    structure.point_in_world[observation.point] =
+        structure.center_in_world[observation.view] +
+        problem.R_c_w[observation.view].transpose() *
+            Eigen::Vector3d(observation.xy.x(), observation.xy.y(), 1.0);
+  }
+}
+
+BisectionStatus Worse(BisectionStatus a, BisectionStatus b) {
+  const auto rank = [](BisectionStatus status) {
+    switch (status) {
+      case BisectionStatus::kConverged:
+        return 0;
+      case BisectionStatus::kIterationLimit:
+        return 1;
+      case BisectionStatus::kCancelled:
+        return 2;
+      case BisectionStatus::kSolverFailed:
+        return 3;
+    }
+    return 3;
+  };
+  return rank(a) < rank(b) ? b : a;
+}
+
+void RequireUsable(const MinimaxProblem& problem,
+                   const BisectionOptions& options,
+                   const MinimaxStructure* start) {
+  if (const auto trouble = options.Problem()) {
+    throw std::invalid_argument("BisectionOptions: " + *trouble);
+  }
+  CheckProblem(problem);
+  if (start == nullptr) return;
+  if (static_cast<int>(start->center_in_world.size()) != problem.num_views() ||
+      static_cast<int>(start->point_in_world.size()) != problem.num_points) {
+    throw std::invalid_argument("minimax problem: the start has other views or points");
+  }
+}
+
+void Solve(const MinimaxProblem& problem,
+           const BisectionOptions& options,
+           const MinimaxStructure* start,
+           BisectionResult& result) {
+  result.status = BisectionStatus::kConverged;
+  result.structure.center_in_world.assign(problem.num_views(), Eigen::Vector3d::Zero());
+  result.structure.point_in_world.assign(problem.num_points, Eigen::Vector3d::Zero());
+  for (const SubProblem& part : ConnectedParts(problem)) {
+    SearchLimits limits;
+    limits.gamma_of_others = result.gamma_low;
+    limits.max_programs = options.max_programs - result.num_programs;
+    limits.only_feasible = result.status == BisectionStatus::kCancelled;
+    MinimaxStructure part_start;
+    if (start != nullptr) part_start = Restrict(*start, part);
+    const auto search = options.method == "interior" ? SearchBracket : BisectPrograms;
+    const Bracket bracket =
+        part.views.size() == 1
+            ? SearchSingleView(part.problem, options)
+            : search(part.problem, options, limits, start != nullptr ? &part_start : nullptr);
+    result.num_programs += bracket.num_programs;
+    result.num_undecided += bracket.num_undecided;
+    result.num_points_in_programs += bracket.num_points_in_programs;
+    result.gamma_low = std::max(result.gamma_low, bracket.gamma_low);
+    result.status = Worse(result.status, bracket.status);
+    if (bracket.gamma_high == kInfinity) {
+      result.structure = {};
+      return;
+    }
+    Enter(part, bracket.structure, result.structure);
+  }
+  PlaceFreePoints(problem, result.structure);
+  result.gamma_high = MaxBoxResidual(problem, result.structure);
 }
 
 }  // namespace
 
 std::optional<std::string> BisectionOptions::Problem() const {
+  if (method != "interior" && method != "programs") {
+    return "method is '" + method + "', must be interior or programs";
+  }
   if (!(relative_gap > 0.0)) {
     return OutOfRange("relative_gap", relative_gap, "above 0");
   }
@@ -77,53 +145,30 @@ std::optional<std::string> BisectionOptions::Problem() const {
   if (!(max_extent > 1.0)) {
     return OutOfRange("max_extent", max_extent, "above 1");
   }
+  if (points_per_view < 4) {
+    return OutOfRange("points_per_view", points_per_view, "at least 4");
+  }
+  if (added_per_view < 1) {
+    return OutOfRange("added_per_view", added_per_view, "at least 1");
+  }
   return std::nullopt;
 }
 
 BisectionResult MinimiseMaxResidual(const MinimaxProblem& problem,
                                     const BisectionOptions& options,
                                     const MinimaxStructure* start) {
-  if (const auto trouble = options.Problem()) {
-    throw std::invalid_argument("BisectionOptions: " + *trouble);
+  const auto begin = std::chrono::steady_clock::now();
+  RequireUsable(problem, options, start);
+  BisectionResult result;
+  Solve(problem, options, start, result);
+  const double active = (1.0 - options.relative_gap) * result.gamma_high;
+  for (int o = 0; o < static_cast<int>(problem.observations.size()); ++o) {
+    if (result.gamma_high == kInfinity) break;
+    if (BoxResidual(problem, result.structure, problem.observations[o]) < active) continue;
+    result.active.push_back(o);
   }
-  BisectionResult bracket;
-  if (start != nullptr) Offer(problem, *start, bracket);
-  // Without a start: widen gamma until a program gives a structure with positive depths.
-  for (double gamma = 0.01; bracket.gamma_high == kInfinity && gamma < 100.0; gamma *= 10.0) {
-    const MinimaxLpResult lp = SolveFeasibility(problem, gamma, options.lp);
-    ++bracket.num_programs;
-    Offer(problem, lp.structure, bracket);
-  }
-  if (bracket.gamma_high == kInfinity) return bracket;
-
-  constexpr int kMaxUndecidedInARow = 7;
-  int undecided_in_a_row = 0;
-  std::vector<Miss> misses;
-  bracket.status = BisectionStatus::kIterationLimit;
-  while (!Narrow(bracket, options)) {
-    if (bracket.num_programs >= options.max_programs) return bracket;
-    if (undecided_in_a_row >= kMaxUndecidedInARow) return bracket;
-    const double gamma = NextGamma(bracket, misses, undecided_in_a_row, options.relative_gap);
-    const MinimaxLpResult lp = SolveFeasibility(problem, gamma, options.lp);
-    ++bracket.num_programs;
-    const double high_before = bracket.gamma_high;
-    Offer(problem, lp.structure, bracket);
-    if (bracket.gamma_high <= gamma) {
-      undecided_in_a_row = 0;
-      continue;
-    }
-    if (CertifiesInfeasible(problem, gamma, lp.multipliers, options.max_extent)) {
-      bracket.gamma_low = gamma;
-      misses.push_back({gamma, lp.objective});
-      undecided_in_a_row = 0;
-      continue;
-    }
-    ++bracket.num_undecided;
-    // A better structure moves the bracket too, though it does not decide this gamma.
-    undecided_in_a_row = bracket.gamma_high < 0.9 * high_before ? 0 : undecided_in_a_row + 1;
-  }
-  bracket.status = BisectionStatus::kConverged;
-  return bracket;
+  result.seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count();
+  return result;
 }
 
 }  // namespace rotslam

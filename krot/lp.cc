@@ -10,6 +10,10 @@
 #include <ClpSimplex.hpp>
 #include <CoinPackedMatrix.hpp>
 
+#ifdef ROTSLAM_WITH_GLPK
+#include "krot/lp_glpk.h"
+#endif
+
 namespace rotslam {
 namespace {
 
@@ -130,18 +134,33 @@ std::string LinearProgram::Problem() const {
   return {};
 }
 
+bool HasLpEngine(LpEngine engine) {
+#ifdef ROTSLAM_WITH_GLPK
+  return engine == LpEngine::kClp || engine == LpEngine::kGlpk;
+#else
+  return engine == LpEngine::kClp;
+#endif
+}
+
 LpResult SolveLp(const LinearProgram& program, const LpOptions& options) {
   if (const std::string problem = program.Problem(); !problem.empty()) {
     throw std::invalid_argument(problem);
   }
+  if (!HasLpEngine(options.engine)) {
+    throw std::invalid_argument("linear program: GLPK is not part of this build");
+  }
   const auto start = std::chrono::steady_clock::now();
   LpResult result;
-  if (options.method == LpMethod::kInteriorPoint) {
+  if (options.engine == LpEngine::kGlpk) {
+#ifdef ROTSLAM_WITH_GLPK
+    SolveWithGlpk(program, options, result);
+#endif
+  } else if (options.method == LpMethod::kInteriorPoint) {
     SolveInterior(program, options, result);
   } else {
     SolveSimplex(program, options, result);
   }
-  for (int c = 0; c < program.num_columns(); ++c) {
+  for (std::size_t c = 0; c < result.primal.size(); ++c) {
     result.objective += program.cost[c] * result.primal[c];
   }
   result.seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();

@@ -41,13 +41,20 @@ enum class LpCallStatus { kNotRun, kCompleted, kFailed };
 enum class LpModelStatus { kUnknown, kOptimal, kInfeasible, kUnbounded, kIterationLimit };
 
 enum class LpMethod { kInteriorPoint, kDualSimplex };
+// CLP is always there. GLPK is the independent second opinion, some 5 to 50 times slower; it is
+// GPL, and a build may leave it out.
+enum class LpEngine { kClp, kGlpk };
+
+/// Whether this build has the engine.
+bool HasLpEngine(LpEngine engine);
 
 struct LpOptions {
+  LpEngine engine = LpEngine::kClp;
   // Interior point: ends with a point inside the optimal face, without clean-up by simplex. Made
   // for programs whose A D A^T is sparse. Dual simplex: exact vertices, for small programs.
   LpMethod method = LpMethod::kInteriorPoint;
   // Interior-point steps, or thousands of simplex pivots. Programs take 15 to 60 steps; those that
-  // take more stall.
+  // take more stall. GLPK's interior point stops when it likes.
   int max_iterations = 80;
 };
 
@@ -61,8 +68,9 @@ struct LpResult {
   double seconds = 0.0;
 };
 
-/// Solves with CLP; prints nothing and gives the same digits on every call.
-/// Throws std::invalid_argument when `program` is not one (see Problem()).
+/// Prints nothing and gives the same digits on every call.
+/// Throws std::invalid_argument when `program` is not one (see Problem()) or this build lacks the
+/// engine.
 LpResult SolveLp(const LinearProgram& program, const LpOptions& options = {});
 
 }  // namespace rotslam

@@ -6,6 +6,8 @@
 
 #include <Eigen/Dense>
 
+#include "krot/structure_system.h"
+
 namespace rotslam {
 namespace {
 
@@ -15,16 +17,7 @@ namespace {
 constexpr double kSlackPrice = 100.0;
 double SlackUnit(double gamma) { return std::max(gamma, 1e-6); }
 
-// Rows of the dual: three per centre (all but the first), then three per point.
-struct RowLayout {
-  int num_views;
-  int num_points;
-  int Center(int view) const { return 3 * (view - 1); }  // negative for the gauge view
-  int Point(int point) const { return 3 * (num_views - 1) + 3 * point; }
-  int size() const { return 3 * (num_views - 1) + 3 * num_points; }
-};
-
-LinearProgram DualRows(const RowLayout& rows) {
+LinearProgram DualRows(const StructureLayout& rows) {
   LinearProgram program;
   for (int r = 0; r < rows.size(); ++r) program.AddRow(0.0, 0.0);
   return program;
@@ -34,7 +27,7 @@ LinearProgram DualRows(const RowLayout& rows) {
 // the depth multiplier by `depth_price` caps. `budget_row` < 0: no shared budget.
 void AddMultipliers(const MinimaxProblem& problem,
                     double gamma,
-                    const RowLayout& rows,
+                    const StructureLayout& rows,
                     int budget_row,
                     const std::vector<double>& caps,
                     double depth_price,
@@ -60,7 +53,7 @@ void AddMultipliers(const MinimaxProblem& problem,
 
 // Centres and points are the prices of the dual's rows. With min -sum w, Lagrangian stationarity
 // gives row prices equal to minus the unknowns.
-MinimaxLpResult FromDual(const LpResult& lp, const RowLayout& rows) {
+MinimaxLpResult FromDual(const LpResult& lp, const StructureLayout& rows) {
   MinimaxLpResult result;
   result.call = lp.call;
   result.model = lp.model;
@@ -92,112 +85,92 @@ void RequireUsable(const MinimaxProblem& problem, double gamma) {
   }
 }
 
-// Residual sums e = sum_k y_k a_k of every centre and point, with what bounds their rounding: the
-// sums of absolute values and the number of terms.
+using NormalTable = std::vector<std::array<Eigen::Vector3d, 5>>;
+
+// Sums whose rounding is summed as well (Neumaier): they err by a few units in the last place of
+// the largest term, however many terms there are.
+class CompensatedSums {
+ public:
+  explicit CompensatedSums(int size)
+      : sum_(Eigen::VectorXd::Zero(size)), lost_(Eigen::VectorXd::Zero(size)) {}
+
+  void Add(int row, const Eigen::Vector3d& term) {
+    for (int axis = 0; axis < 3; ++axis) {
+      double& sum = sum_[row + axis];
+      const double next = sum + term[axis];
+      lost_[row + axis] += std::abs(sum) >= std::abs(term[axis]) ? (sum - next) + term[axis]
+                                                                 : (term[axis] - next) + sum;
+      sum = next;
+    }
+  }
+  Eigen::VectorXd Total() const { return sum_ + lost_; }
+
+ private:
+  Eigen::VectorXd sum_;
+  Eigen::VectorXd lost_;
+};
+
+// Residual sums e = sum_k y_k a_k of every centre and point, with what bounds their rounding.
 struct Imbalance {
   Eigen::VectorXd sum;
-  Eigen::VectorXd absolute_sum;
-  Eigen::VectorXd terms;
+  double absolute_sum = 0.0;  // of the absolute values of all terms
+  double num_terms = 0.0;
 
-  // Largest 1-norm the exact sums can have. A sum of n rounded terms errs by less than
-  // n * epsilon * (sum of absolute values); a normal's entry carries five roundings itself.
+  // Largest 1-norm the exact sums can have. Every term carries up to eight roundings of its own
+  // from the normal and the product; the compensated sums of n terms add two and n^2 epsilon.
   double Bound() const {
     constexpr double kEpsilon = 2.3e-16;
-    return sum.lpNorm<1>() + kEpsilon * absolute_sum.dot((terms.array() + 8.0).matrix());
+    const double of_sums = 4.0 + kEpsilon * num_terms * num_terms;
+    return sum.lpNorm<1>() * (1.0 + 4.0 * kEpsilon * static_cast<double>(sum.size())) +
+           kEpsilon * absolute_sum * (8.0 + of_sums);
   }
 };
 
-using NormalTable = std::vector<std::array<Eigen::Vector3d, 5>>;
-
 Imbalance ComputeImbalance(const MinimaxProblem& problem,
                            const NormalTable& normals,
-                           const RowLayout& rows,
+                           const StructureLayout& rows,
                            const std::vector<double>& y) {
-  const Eigen::VectorXd zero = Eigen::VectorXd::Zero(rows.size());
-  Imbalance imbalance{zero, zero, zero};
+  CompensatedSums sums(rows.size());
+  Imbalance imbalance;
   for (std::size_t o = 0; o < normals.size(); ++o) {
     const ImageObservation& observation = problem.observations[o];
-    imbalance.terms.segment<3>(rows.Point(observation.point)).array() += 5.0;
-    if (observation.view > 0) {
-      imbalance.terms.segment<3>(rows.Center(observation.view)).array() += 5.0;
-    }
     for (int k = 0; k < 5; ++k) {
       const Eigen::Vector3d term = y[5 * o + k] * normals[o][k];
-      imbalance.sum.segment<3>(rows.Point(observation.point)) += term;
-      imbalance.absolute_sum.segment<3>(rows.Point(observation.point)) += term.cwiseAbs();
-      if (observation.view == 0) continue;
-      imbalance.sum.segment<3>(rows.Center(observation.view)) -= term;
-      imbalance.absolute_sum.segment<3>(rows.Center(observation.view)) += term.cwiseAbs();
+      sums.Add(rows.Point(observation.point), term);
+      imbalance.absolute_sum += 2.0 * term.lpNorm<1>();
+      if (observation.view > 0) sums.Add(rows.Center(observation.view), -term);
     }
   }
+  imbalance.sum = sums.Total();
+  imbalance.num_terms = 5.0 * static_cast<double>(normals.size());
   return imbalance;
 }
 
 // One step y += -D E^T (E D E^T)^-1 e with D = diag(y): every multiplier moves by a share of itself
 // and stays positive. (D = diag(y^2) spans twice the digits and left imbalances of 1e-8 where this
-// reaches 1e-14.) E D E^T is eliminated point by point, as in bundle adjustment.
+// reaches 1e-14.)
 bool RepairStep(const MinimaxProblem& problem,
                 const NormalTable& normals,
-                const RowLayout& rows,
+                const StructureLayout& rows,
                 const Eigen::VectorXd& imbalance,
+                StructureSystem& system,
                 std::vector<double>& y) {
-  const int num_center_rows = 3 * (rows.num_views - 1);
   std::vector<Eigen::Matrix3d> S(normals.size(), Eigen::Matrix3d::Zero());
-  std::vector<Eigen::Matrix3d> H_point(rows.num_points, Eigen::Matrix3d::Zero());
-  std::vector<std::vector<int>> observations_of(rows.num_points);
-  Eigen::MatrixXd H = Eigen::MatrixXd::Zero(num_center_rows, num_center_rows);
-  Eigen::VectorXd g = imbalance.head(num_center_rows);
   for (std::size_t o = 0; o < normals.size(); ++o) {
-    const ImageObservation& observation = problem.observations[o];
     for (int k = 0; k < 5; ++k) {
       S[o] += y[5 * o + k] * normals[o][k] * normals[o][k].transpose();
     }
-    H_point[observation.point] += S[o];
-    observations_of[observation.point].push_back(static_cast<int>(o));
-    if (observation.view == 0) continue;
-    const int row = rows.Center(observation.view);
-    H.block<3, 3>(row, row) += S[o];
   }
-  double largest_trace = 0.0;
-  for (const Eigen::Matrix3d& block : H_point) {
-    largest_trace = std::max(largest_trace, block.trace());
-  }
-  if (!(largest_trace > 0.0)) return false;
-  const double damping = 1e-18 * largest_trace;
-  std::vector<Eigen::Matrix3d> H_point_inverse(rows.num_points);
-  for (int i = 0; i < rows.num_points; ++i) {
-    H_point_inverse[i] = (H_point[i] + damping * Eigen::Matrix3d::Identity()).inverse();
-    const Eigen::Vector3d from_point = H_point_inverse[i] * imbalance.segment<3>(rows.Point(i));
-    for (const int a : observations_of[i]) {
-      const int view_a = problem.observations[a].view;
-      if (view_a == 0) continue;
-      g.segment<3>(rows.Center(view_a)) += S[a] * from_point;
-      for (const int b : observations_of[i]) {
-        const int view_b = problem.observations[b].view;
-        if (view_b == 0) continue;
-        H.block<3, 3>(rows.Center(view_a), rows.Center(view_b)) -= S[a] * H_point_inverse[i] * S[b];
-      }
-    }
-  }
-  H.diagonal().array() += damping;
-  const Eigen::VectorXd lambda_centers = H.ldlt().solve(g);
-  if (!lambda_centers.allFinite()) return false;
-  const auto lambda_center = [&](int view) -> Eigen::Vector3d {
-    if (view == 0) return Eigen::Vector3d::Zero();
-    return lambda_centers.segment<3>(rows.Center(view));
-  };
-  for (int i = 0; i < rows.num_points; ++i) {
-    Eigen::Vector3d right = imbalance.segment<3>(rows.Point(i));
-    for (const int o : observations_of[i]) {
-      right += S[o] * lambda_center(problem.observations[o].view);
-    }
-    const Eigen::Vector3d lambda_point = H_point_inverse[i] * right;
-    for (const int o : observations_of[i]) {
-      const Eigen::Vector3d difference = lambda_point - lambda_center(problem.observations[o].view);
-      for (int k = 0; k < 5; ++k) {
-        double& multiplier = y[5 * o + k];
-        multiplier = std::max(0.0, multiplier - multiplier * normals[o][k].dot(difference));
-      }
+  if (!system.Factor(S)) return false;
+  const Eigen::VectorXd lambda = system.Solve(S, imbalance);
+  if (!lambda.allFinite()) return false;
+  for (std::size_t o = 0; o < normals.size(); ++o) {
+    const ImageObservation& observation = problem.observations[o];
+    Eigen::Vector3d difference = lambda.segment<3>(rows.Point(observation.point));
+    if (observation.view > 0) difference -= lambda.segment<3>(rows.Center(observation.view));
+    for (int k = 0; k < 5; ++k) {
+      double& multiplier = y[5 * o + k];
+      multiplier = std::max(0.0, multiplier - multiplier * normals[o][k].dot(difference));
     }
   }
   return true;
@@ -222,7 +195,7 @@ MinimaxLpResult SolveFeasibility(const MinimaxProblem& problem,
                                  double gamma,
                                  const LpOptions& options) {
   RequireUsable(problem, gamma);
-  const RowLayout rows{problem.num_views(), problem.num_points};
+  const StructureLayout rows{problem.num_views(), problem.num_points};
   LinearProgram program = DualRows(rows);
   const int budget_row = program.num_rows();
   program.AddRow(-kInfinity, kSlackPrice);
@@ -241,7 +214,7 @@ MinimaxLpResult SolveL1Slack(const MinimaxProblem& problem,
   }
   const std::vector<double> caps =
       weights.empty() ? std::vector<double>(problem.observations.size(), 1.0) : weights;
-  const RowLayout rows{problem.num_views(), problem.num_points};
+  const StructureLayout rows{problem.num_views(), problem.num_points};
   LinearProgram program = DualRows(rows);
   AddMultipliers(problem, gamma, rows, -1, caps, depth_price, program);
   return FromDual(SolveLp(program, options), rows);
@@ -260,8 +233,10 @@ bool CertifiesInfeasible(const MinimaxProblem& problem,
   }
   if (largest == 0.0) return false;
   for (double& multiplier : y) multiplier /= largest;
-  const RowLayout rows{problem.num_views(), problem.num_points};
+  const StructureLayout rows{problem.num_views(), problem.num_points};
+  StructureSystem system(problem);
   NormalTable normals;
+  normals.reserve(problem.observations.size());
   for (const ImageObservation& observation : problem.observations) {
     normals.push_back(HalfSpaceNormals(problem.R_c_w[observation.view], observation.xy, gamma));
   }
@@ -274,7 +249,7 @@ bool CertifiesInfeasible(const MinimaxProblem& problem,
     for (std::size_t o = 0; o < normals.size(); ++o) depth_sum += y[5 * o + 4];
     if (depth_sum > 2.0 * max_extent * imbalance.Bound()) return true;
     if (round == kMaxRepairs) return false;
-    if (!RepairStep(problem, normals, rows, imbalance.sum, y)) return false;
+    if (!RepairStep(problem, normals, rows, imbalance.sum, system, y)) return false;
   }
 }
 

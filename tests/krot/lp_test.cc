@@ -17,10 +17,23 @@ LinearProgram SmallProgram() {
   return program;
 }
 
-TEST(SolveLp, FindsOptimumAndPricesByBothMethods) {
-  for (const LpMethod method : {LpMethod::kInteriorPoint, LpMethod::kDualSimplex}) {
-    LpOptions options;
-    options.method = method;
+// Every engine of this build with every method.
+std::vector<LpOptions> AllWays() {
+  std::vector<LpOptions> ways;
+  for (const LpEngine engine : {LpEngine::kClp, LpEngine::kGlpk}) {
+    if (!HasLpEngine(engine)) continue;
+    for (const LpMethod method : {LpMethod::kInteriorPoint, LpMethod::kDualSimplex}) {
+      LpOptions options;
+      options.engine = engine;
+      options.method = method;
+      ways.push_back(options);
+    }
+  }
+  return ways;
+}
+
+TEST(SolveLp, FindsOptimumAndPricesByAllEnginesAndMethods) {
+  for (const LpOptions& options : AllWays()) {
     const LpResult result = SolveLp(SmallProgram(), options);
     ASSERT_EQ(result.call, LpCallStatus::kCompleted);
     EXPECT_EQ(result.model, LpModelStatus::kOptimal);
@@ -33,21 +46,24 @@ TEST(SolveLp, FindsOptimumAndPricesByBothMethods) {
 }
 
 TEST(SolveLp, RepeatsItsDigits) {
-  const LpResult a = SolveLp(SmallProgram());
-  const LpResult b = SolveLp(SmallProgram());
-  EXPECT_EQ(a.primal, b.primal);
-  EXPECT_EQ(a.row_dual, b.row_dual);
+  for (const LpOptions& options : AllWays()) {
+    const LpResult a = SolveLp(SmallProgram(), options);
+    const LpResult b = SolveLp(SmallProgram(), options);
+    EXPECT_EQ(a.primal, b.primal);
+    EXPECT_EQ(a.row_dual, b.row_dual);
+  }
 }
 
 TEST(SolveLp, InfeasibleIsAModelStatusNotAFailedCall) {
   LinearProgram program = SmallProgram();
   program.AddRow(10.0, kInfinity);
   program.AddColumn(0.0, 0.0, 1.0, std::vector<std::pair<int, double>>{{2, 1.0}});
-  LpOptions options;
-  options.method = LpMethod::kDualSimplex;
-  const LpResult result = SolveLp(program, options);
-  EXPECT_EQ(result.call, LpCallStatus::kCompleted);
-  EXPECT_EQ(result.model, LpModelStatus::kInfeasible);
+  for (const LpOptions& options : AllWays()) {
+    if (options.method != LpMethod::kDualSimplex) continue;
+    const LpResult result = SolveLp(program, options);
+    EXPECT_EQ(result.call, LpCallStatus::kCompleted);
+    EXPECT_EQ(result.model, LpModelStatus::kInfeasible);
+  }
 }
 
 TEST(SolveLp, RefusesWhatIsNoProgram) {
@@ -55,6 +71,13 @@ TEST(SolveLp, RefusesWhatIsNoProgram) {
   LinearProgram program = SmallProgram();
   program.row_index[0] = 7;
   EXPECT_THROW(SolveLp(program), std::invalid_argument);
+}
+
+TEST(SolveLp, RefusesAnEngineThatIsNotThere) {
+  if (HasLpEngine(LpEngine::kGlpk)) GTEST_SKIP() << "this build has every engine";
+  LpOptions options;
+  options.engine = LpEngine::kGlpk;
+  EXPECT_THROW(SolveLp(SmallProgram(), options), std::invalid_argument);
 }
 
 }  // namespace

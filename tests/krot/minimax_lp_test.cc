@@ -40,23 +40,28 @@ TEST(MaxBoxResidual, IsZeroAtTheTruthAndInfiniteBehindACamera) {
 
 TEST(SolveFeasibility, FeasibleAtGammaImpliesFeasibleAbove) {
   const MinimaxProblem problem = ProblemFromScene(MakeScene(SmallNoisy()));
-  bool was_feasible = false;
-  int num_feasible = 0;
-  int num_infeasible = 0;
-  for (double gamma_px = 0.25; gamma_px < 16.0; gamma_px *= 1.3) {
-    const double gamma = gamma_px / 700.0;
-    const MinimaxLpResult lp = SolveFeasibility(problem, gamma);
-    ASSERT_EQ(lp.call, LpCallStatus::kCompleted);
-    const bool feasible = MaxBoxResidual(problem, lp.structure) <= gamma;
-    const bool infeasible = CertifiesInfeasible(problem, gamma, lp.multipliers, 1e6);
-    EXPECT_NE(feasible, infeasible) << gamma_px;
-    EXPECT_TRUE(feasible || !was_feasible) << gamma_px;
-    was_feasible = feasible;
-    num_feasible += feasible;
-    num_infeasible += infeasible;
+  for (const LpEngine engine : {LpEngine::kClp, LpEngine::kGlpk}) {
+    if (!HasLpEngine(engine)) continue;
+    LpOptions options;
+    options.engine = engine;
+    bool was_feasible = false;
+    int num_feasible = 0;
+    int num_infeasible = 0;
+    for (double gamma_px = 0.25; gamma_px < 16.0; gamma_px *= 1.3) {
+      const double gamma = gamma_px / 700.0;
+      const MinimaxLpResult lp = SolveFeasibility(problem, gamma, options);
+      ASSERT_EQ(lp.call, LpCallStatus::kCompleted);
+      const bool feasible = MaxBoxResidual(problem, lp.structure) <= gamma;
+      const bool infeasible = CertifiesInfeasible(problem, gamma, lp.multipliers, 1e6);
+      EXPECT_NE(feasible, infeasible) << gamma_px;
+      EXPECT_TRUE(feasible || !was_feasible) << gamma_px;
+      was_feasible = feasible;
+      num_feasible += feasible;
+      num_infeasible += infeasible;
+    }
+    EXPECT_GT(num_feasible, 2);
+    EXPECT_GT(num_infeasible, 2);
   }
-  EXPECT_GT(num_feasible, 2);
-  EXPECT_GT(num_infeasible, 2);
 }
 
 TEST(CertifiesInfeasible, NeverBelievesWhatATruthContradicts) {

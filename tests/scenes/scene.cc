@@ -35,7 +35,8 @@ void PlaceCameras(const SceneOptions& options, SceneRandom& random, Scene& scene
     const FrameId frame{k};
     Rotation cam_from_world;
     switch (options.path) {
-      case ScenePath::kRing: {
+      case ScenePath::kRing:
+      case ScenePath::kOrbit: {
         const double angle = 2.0 * std::numbers::pi * k / n;
         center = Eigen::Vector3d(
             6.0 * std::cos(angle), random.Uniform(-0.5, 0.5), 6.0 * std::sin(angle));
@@ -84,6 +85,8 @@ Eigen::Vector3d DrawPoint(const SceneOptions& options, SceneRandom& random, cons
     }
     case ScenePath::kRandom:
       return {random.Uniform(-2.5, 2.5), random.Uniform(-2, 2), random.Uniform(5, 10)};
+    case ScenePath::kOrbit:
+      return {random.Uniform(-1.5, 1.5), random.Uniform(-1.2, 1.2), random.Uniform(-1.5, 1.5)};
     case ScenePath::kPivot:
       return {random.Uniform(-6, 8), random.Uniform(-3, 3), random.Uniform(4, 12)};
   }
@@ -104,7 +107,88 @@ Eigen::Vector3d PinholeBearing(const Camera& camera, const Eigen::Vector2d& px) 
       .normalized();
 }
 
+struct ViewPose {
+  FrameId frame;
+  Rotation cam_from_world;
+  Eigen::Vector3d center_in_world;
+};
+
+std::vector<ViewPose> TruePoses(const Scene& scene) {
+  std::vector<ViewPose> poses;
+  for (const auto& [frame, rotation] : scene.true_cam_from_world) {
+    poses.push_back({frame, rotation, scene.true_center_in_world.at(frame)});
+  }
+  return poses;
+}
+
+// Views that can see the point with their distances, nearest first.
+std::vector<std::pair<double, FrameId>> ViewsThatCanSee(const Camera& camera,
+                                                        const std::vector<ViewPose>& poses,
+                                                        const Eigen::Vector3d& point) {
+  constexpr double kNear = 2.0;
+  constexpr double kFar = 45.0;
+  // Twice the farthest depth is beyond any corner of the image; most views of a long street are.
+  constexpr double kTooFar = 2.0 * kFar;
+  std::vector<std::pair<double, FrameId>> seen_by;
+  for (const ViewPose& pose : poses) {
+    const Eigen::Vector3d offset = point - pose.center_in_world;
+    if (offset.squaredNorm() > kTooFar * kTooFar) continue;
+    const Eigen::Vector3d in_cam = pose.cam_from_world * offset;
+    if (in_cam.z() < kNear || in_cam.z() > kFar) continue;
+    if (!InImage(camera, PinholePixel(camera, in_cam))) continue;
+    seen_by.emplace_back(in_cam.norm(), pose.frame);
+  }
+  std::sort(seen_by.begin(), seen_by.end());
+  return seen_by;
+}
+
+// An orbit's sights: every third of the nearest on average, of all views for every tenth point;
+// the number has an exponential tail.
+void KeepOrbitSights(SceneRandom& random, std::vector<std::pair<double, FrameId>>& seen_by) {
+  constexpr double kMeanBeyondThree = 8.9;
+  const int length =
+      3 + static_cast<int>(-kMeanBeyondThree * std::log(1.0 - random.Uniform(0.0, 1.0)));
+  const bool from_anywhere = random.Index(10) == 0;
+  const std::size_t reach = from_anywhere ? seen_by.size() : static_cast<std::size_t>(3 * length);
+  seen_by.resize(std::min(seen_by.size(), reach));
+  while (static_cast<int>(seen_by.size()) > length) {
+    seen_by.erase(seen_by.begin() + random.Index(static_cast<int>(seen_by.size())));
+  }
+}
+
+// Cuts the sights of one point, nearest first, to those its track has; sorted by view.
+void KeepSome(const SceneOptions& options,
+              SceneRandom& random,
+              std::vector<std::pair<double, FrameId>>& seen_by) {
+  int length = static_cast<int>(seen_by.size());
+  if (options.max_track_length > 0) length = std::min(length, options.max_track_length);
+  // Street tracks die young now and then, as real ones do.
+  if (options.path == ScenePath::kStreet) length = std::min(length, 3 + random.Index(8));
+  seen_by.resize(length);
+  if (options.path == ScenePath::kOrbit) KeepOrbitSights(random, seen_by);
+  std::sort(seen_by.begin(), seen_by.end(), [](const auto& a, const auto& b) {
+    return a.second < b.second;
+  });
+}
+
 }  // namespace
+
+SceneOptions DrivingOptions(int num_views, int num_points, std::uint64_t seed) {
+  SceneOptions options;
+  options.num_views = num_views;
+  options.num_points = num_points;
+  options.noise_px = 0.7;
+  options.rotation_noise_deg = 0.03;
+  options.path = ScenePath::kStreet;
+  options.seed = seed;
+  return options;
+}
+
+SceneOptions DenseOrbitOptions(std::uint64_t seed) {
+  SceneOptions options = DrivingOptions(172, 14828, seed);
+  options.path = ScenePath::kOrbit;
+  return options;
+}
 
 std::uint64_t SceneRandom::Next() {  // splitmix64
   std::uint64_t z = (state_ += 0x9E3779B97F4A7C15ull);
@@ -139,26 +223,12 @@ Scene MakeScene(const SceneOptions& options) {
             : Rotation::Exp({random.Normal(sigma), random.Normal(sigma), random.Normal(sigma)}) *
                   rotation;
   }
+  const std::vector<ViewPose> poses = TruePoses(scene);
   for (int i = 0; i < options.num_points; ++i) {
     const TrackId id{i};
     const Eigen::Vector3d point = DrawPoint(options, random, scene);
-    // Views that can see it, nearest first, cut to the wanted length.
-    std::vector<std::pair<double, FrameId>> seen_by;
-    for (const auto& [frame, rotation] : scene.true_cam_from_world) {
-      const Eigen::Vector3d in_cam = rotation * (point - scene.true_center_in_world.at(frame));
-      if (in_cam.z() < 2.0 || in_cam.z() > 45.0) continue;
-      if (!InImage(scene.camera, PinholePixel(scene.camera, in_cam))) continue;
-      seen_by.emplace_back(in_cam.norm(), frame);
-    }
-    std::sort(seen_by.begin(), seen_by.end());
-    int length = static_cast<int>(seen_by.size());
-    if (options.max_track_length > 0) length = std::min(length, options.max_track_length);
-    // Street tracks die young now and then, as real ones do.
-    if (options.path == ScenePath::kStreet) length = std::min(length, 3 + random.Index(8));
-    seen_by.resize(length);
-    std::sort(seen_by.begin(), seen_by.end(), [](const auto& a, const auto& b) {
-      return a.second < b.second;
-    });
+    std::vector<std::pair<double, FrameId>> seen_by = ViewsThatCanSee(scene.camera, poses, point);
+    KeepSome(options, random, seen_by);
     if (seen_by.size() < 2) continue;
     Track track;
     track.id = id;
