@@ -63,6 +63,65 @@ BundleResult RefineComponent(const MapComponent& component,
   return RefineBundle(problem, options);
 }
 
+std::vector<Track> WithBearingsOf(const Camera& camera, std::vector<Track> tracks) {
+  for (Track& track : tracks) {
+    for (Observation& observation : track.observations) {
+      const auto bearing = camera.Unproject(observation.keypoint_px);
+      if (bearing) observation.bearing = *bearing;
+    }
+  }
+  return tracks;
+}
+
+// Position of the component with the most observations.
+std::size_t LargestComponent(const std::vector<MapComponent>& components,
+                             const std::vector<Track>& tracks) {
+  std::map<FrameId, int> count;
+  for (const Track& track : tracks) {
+    for (const Observation& observation : track.observations) ++count[observation.frame];
+  }
+  std::size_t largest = 0;
+  int most = 0;
+  for (std::size_t k = 0; k < components.size(); ++k) {
+    int sum = 0;
+    for (const FrameId frame : components[k].keyframes) sum += count[frame];
+    if (sum <= most) continue;
+    most = sum;
+    largest = k;
+  }
+  return largest;
+}
+
+// Bundle adjustment of every component. The largest one refines the lens, the others take it over.
+std::vector<BundleResult> RefineComponents(const std::vector<MapComponent>& components,
+                                           const std::vector<Track>& tracks,
+                                           const BundleOptions& options,
+                                           PositionResult& result) {
+  std::vector<BundleResult> bundles(components.size());
+  if (components.empty()) return bundles;
+  const auto refine =
+      [&](std::size_t k, const std::vector<Track>& seen, const BundleOptions& bundle_options) {
+        bundles[k] = RefineComponent(components[k],
+                                     result.cam_from_world,
+                                     result.krot,
+                                     seen,
+                                     result.held,
+                                     result.camera,
+                                     bundle_options);
+      };
+  const std::size_t first = LargestComponent(components, tracks);
+  refine(first, tracks, options);
+  result.camera = bundles[first].camera;
+  if (components.size() == 1) return bundles;
+  BundleOptions same_lens = options;
+  same_lens.lens.refine_focal = same_lens.lens.refine_distortion = false;
+  const std::vector<Track> seen = WithBearingsOf(result.camera, tracks);
+  for (std::size_t k = 0; k < components.size(); ++k) {
+    if (k != first) refine(k, seen, same_lens);
+  }
+  return bundles;
+}
+
 // x_new = scale * turn * x_old + shift.
 struct Similarity {
   double scale = 1.0;
@@ -278,9 +337,10 @@ PositionResult FindPositions(const Orientations& orientations,
                              Progress& progress) {
   PositionResult result;
   result.cam_from_world = orientations.cam_from_world;
+  result.camera = camera;
 
   progress.StartStage("tracks", -1);
-  const std::vector<Track> all_tracks = BuildTracks(
+  std::vector<Track> all_tracks = BuildTracks(
       orientations.edge_matches, orientations.features, AllFrames(result.cam_from_world), 2);
   result.held =
       FindHeldStretches(orientations.graph, result.cam_from_world, options.held_stretches);
@@ -312,9 +372,11 @@ PositionResult FindPositions(const Orientations& orientations,
   progress.StartStage("bundle adjustment", -1);
   BundleOptions bundle_options = options.ba;
   bundle_options.num_threads = num_threads;
-  for (MapComponent& component : ComponentsOf(result.krot)) {
-    BundleResult bundle = RefineComponent(
-        component, result.cam_from_world, result.krot, tracks, result.held, camera, bundle_options);
+  std::vector<MapComponent> components = ComponentsOf(result.krot);
+  std::vector<BundleResult> bundles = RefineComponents(components, tracks, bundle_options, result);
+  for (std::size_t k = 0; k < components.size(); ++k) {
+    MapComponent& component = components[k];
+    BundleResult& bundle = bundles[k];
     if (!bundle.Usable() || bundle.reconstruction.center_in_world.size() < 2) continue;
     if (!result.components.empty()) {
       component.placed_by_default = true;
@@ -337,19 +399,21 @@ PositionResult FindPositions(const Orientations& orientations,
     return WithoutMap(std::move(result), "bundle adjustment found no usable map");
   }
   progress.EndStage(std::to_string(result.map.point_in_world.size()) + " points, mean error " +
-                    std::to_string(result.bundles.front().after.mean_px) + " px");
+                    std::to_string(result.bundles.front().after.mean_px) + " px, " +
+                    Describe(result.camera));
 
   progress.StartStage("frames between keyframes", -1);
+  all_tracks = WithBearingsOf(result.camera, std::move(all_tracks));
   PlaceRemainingFrames(
-      all_tracks, orientations.timestamps_s, camera, options.resection, num_threads, result);
+      all_tracks, orientations.timestamps_s, result.camera, options.resection, num_threads, result);
   // Their neighbours have moved a little since.
   InterpolateUnconnected(orientations, result.cam_from_world);
   progress.EndStage(std::to_string(result.num_resected) + " resected, " +
                     std::to_string(result.num_interpolated) + " interpolated");
 
   progress.StartStage("cloud", -1);
-  result.cloud = WithoutShallowPoints(MakeCloudOf(result, all_tracks, camera, bundle_options),
-                                      options.cloud_min_angle_deg);
+  result.cloud = WithoutShallowPoints(
+      MakeCloudOf(result, all_tracks, result.camera, bundle_options), options.cloud_min_angle_deg);
   progress.EndStage(std::to_string(result.cloud.point_in_world.size()) + " points");
   return result;
 }

@@ -21,6 +21,7 @@ struct PositionResult {
   CenterMap center_in_world;   // of every frame
   Reconstruction map;          // refined keyframes, points and their tracks
   Reconstruction cloud;        // every frame, and every deep enough track that its poses explain
+  Camera camera;               // as the map's largest component has refined it
   std::set<FrameId> keyframes;
   std::vector<HeldStretch> held;
   std::vector<MapComponent> components;  // by their first keyframe

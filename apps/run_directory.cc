@@ -179,6 +179,7 @@ void AddPositions(const PositionResult& positions, const Camera& camera, RunSumm
   krot.removed = count(positions.krot.removed.size());
   krot.more = {{"message", positions.krot.message}};
   summary.krot = krot;
+  summary.seconds.push_back({"known_rotation", positions.krot.seconds});
   if (positions.bundles.empty()) return;
 
   // Sums over the components; means are weighted by their observations.
@@ -194,20 +195,28 @@ void AddPositions(const PositionResult& positions, const Camera& camera, RunSumm
     final_cost += bundle.final_cost;
     error_sum_px += bundle.after.mean_px * bundle.num_observations;
   }
-  const ResidualStatistics& largest =
-      std::max_element(positions.bundles.begin(),
-                       positions.bundles.end(),
-                       [](const BundleSummary& a, const BundleSummary& b) {
-                         return a.num_observations < b.num_observations;
-                       })
-          ->after;
+  const BundleSummary& largest =
+      *std::max_element(positions.bundles.begin(),
+                        positions.bundles.end(),
+                        [](const BundleSummary& a, const BundleSummary& b) {
+                          return a.num_observations < b.num_observations;
+                        });
   summary.ba = SummaryTable{{"observations", observations},
                             {"iterations", iterations},
                             {"initial_cost", initial_cost},
                             {"final_cost", final_cost},
                             {"mean_error_px", error_sum_px / static_cast<double>(observations)},
-                            {"median_error_px", largest.median_px},
-                            {"p90_error_px", largest.p90_px}};
+                            {"median_error_px", largest.after.median_px},
+                            {"p90_error_px", largest.after.p90_px},
+                            {"lens.gain", largest.lens_gain},
+                            {"lens.refined", largest.lens_refined},
+                            {"lens.fx", positions.camera.fx},
+                            {"lens.fy", positions.camera.fy},
+                            {"lens.k1", positions.camera.distortion[0]},
+                            {"lens.k2", positions.camera.distortion[1]}};
+  double bundle_seconds = 0.0;
+  for (const BundleSummary& bundle : positions.bundles) bundle_seconds += bundle.seconds;
+  summary.seconds.push_back({"bundle_adjustment", bundle_seconds});
 }
 
 }  // namespace rotslam

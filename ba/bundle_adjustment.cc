@@ -22,49 +22,93 @@ bool AllFinite(const BundleState& state) {
   });
 }
 
-// Classifies, minimises, and tells whether the next round may go on from here.
-bool RunRound(const Camera& camera,
-              const std::string& name,
-              const BundleRound& round,
-              const BundleOptions& options,
-              BundleState& state,
-              BundleResult& result) {
-  const auto start = std::chrono::steady_clock::now();
-  ClassifyAll(camera, round.max_error_px, /*retriangulate=*/true, options, state);
-  const ResidualStatistics before = Statistics(camera, state);
-  const auto solver_start = std::chrono::steady_clock::now();
-  const std::optional<MinimisationResult> minimised = Minimise(camera, round, options, state);
-  if (!minimised) {
-    result.status = BundleStatus::kTooLittleData;
-    result.message = "round " + name + " had no moving frame with at least " +
-                     std::to_string(options.min_frame_observations) +
-                     " observations of points that fit and have depth";
-    return false;
-  }
-  if (result.summary.rounds.empty()) result.summary.before = before;
+// The rounds of one problem, one after the other.
+class Rounds {
+ public:
+  Rounds(const Camera& calibrated,
+         const BundleOptions& options,
+         BundleState& state,
+         BundleResult& result)
+      : calibrated_(calibrated), options_(options), state_(state), result_(result) {}
 
-  const ceres::Solver::Summary& solved = minimised->solver;
-  BundleRoundSummary summary = minimised->counts;
-  summary.name = name;
-  summary.initial_cost = solved.initial_cost;
-  summary.final_cost = solved.final_cost;
-  summary.iterations = static_cast<int>(solved.iterations.size()) - 1;
-  summary.termination = solved.message;
-  summary.solver_seconds = SecondsSince(solver_start);
-  summary.seconds = SecondsSince(start);
-  result.summary.rounds.push_back(summary);
-  if (!solved.IsSolutionUsable() || !AllFinite(state)) {
-    result.status = BundleStatus::kSolverFailed;
-    result.message = "round " + name + ": " + solved.message;
-    return false;
+  // Classifies and minimises, as long as nothing has gone wrong.
+  void Run(const std::string& name, const BundleRound& round) {
+    if (!good_ || !round.enabled) return;
+    const auto start = std::chrono::steady_clock::now();
+    max_error_px_ = round.max_error_px;
+    ClassifyAll(round.max_error_px, /*retriangulate=*/true, options_, state_);
+    const ResidualStatistics before = Statistics(state_);
+    const bool is_first = result_.summary.rounds.empty();
+    Minimise(name, round, start);
+    if (good_ && is_first) result_.summary.before = before;
   }
-  result.status = solved.termination_type == ceres::CONVERGENCE ? BundleStatus::kConverged
-                                                                : BundleStatus::kIterationLimit;
-  return true;
-}
+
+  // Lets the lens move on the observations of the round before; keeps that when it gains enough.
+  void TryLens(const BundleRound& round) {
+    const LensOptions& lens = options_.lens;
+    if (!good_ || !round.enabled) return;
+    if (!lens.refine_focal && !lens.refine_distortion) return;
+    const BundleState before = state_;
+    refine_lens_ = true;
+    Minimise("lens", round, std::chrono::steady_clock::now());
+    if (!good_) return;
+    const BundleRoundSummary& summary = result_.summary.rounds.back();
+    result_.summary.lens_gain = 1.0 - summary.final_cost / summary.initial_cost;
+    refine_lens_ = result_.summary.lens_gain >= lens.min_gain;
+    result_.summary.lens_refined = refine_lens_;
+    if (!refine_lens_) state_ = before;
+  }
+
+  bool good() const { return good_; }
+  double max_error_px() const { return max_error_px_; }  // of the last round
+
+ private:
+  void Minimise(const std::string& name,
+                const BundleRound& round,
+                std::chrono::steady_clock::time_point start) {
+    const auto solver_start = std::chrono::steady_clock::now();
+    const std::optional<MinimisationResult> minimised =
+        rotslam::Minimise(calibrated_, round, refine_lens_, options_, state_);
+    good_ = minimised.has_value();
+    if (!minimised) {
+      result_.status = BundleStatus::kTooLittleData;
+      result_.message = "round " + name + " had no moving frame with at least " +
+                        std::to_string(options_.min_frame_observations) +
+                        " observations of points that fit and have depth";
+      return;
+    }
+    const ceres::Solver::Summary& solved = minimised->solver;
+    BundleRoundSummary summary = minimised->counts;
+    summary.name = name;
+    summary.initial_cost = solved.initial_cost;
+    summary.final_cost = solved.final_cost;
+    summary.iterations = static_cast<int>(solved.iterations.size()) - 1;
+    summary.termination = solved.message;
+    summary.solver_seconds = SecondsSince(solver_start);
+    summary.seconds = SecondsSince(start);
+    result_.summary.rounds.push_back(summary);
+    good_ = solved.IsSolutionUsable() && AllFinite(state_);
+    if (!good_) {
+      result_.status = BundleStatus::kSolverFailed;
+      result_.message = "round " + name + ": " + solved.message;
+      return;
+    }
+    result_.status = solved.termination_type == ceres::CONVERGENCE ? BundleStatus::kConverged
+                                                                   : BundleStatus::kIterationLimit;
+  }
+
+  const Camera& calibrated_;
+  const BundleOptions& options_;
+  BundleState& state_;
+  BundleResult& result_;
+  bool good_ = true;
+  bool refine_lens_ = false;
+  double max_error_px_ = 0.0;
+};
 
 // Poses and well-fitting tracks of `state`.
 void TakeResult(const BundleProblem& problem, const BundleState& state, BundleResult& result) {
+  result.camera = state.camera;
   Reconstruction& out = result.reconstruction;
   out.cam_from_world = problem.start.cam_from_world;
   std::vector<bool> center_seen(state.centers.size(), false);
@@ -75,6 +119,7 @@ void TakeResult(const BundleProblem& problem, const BundleState& state, BundleRe
     for (const Sight& sight : entry.sights) {
       if (!sight.used) continue;
       track.observations.push_back(*sight.observation);
+      track.observations.back().bearing = sight.bearing;
       center_seen[state.frames[sight.frame].center] = true;
     }
     result.summary.num_observations += static_cast<int>(track.observations.size());
@@ -121,16 +166,11 @@ BundleResult RefineBundle(const BundleProblem& problem, const BundleOptions& opt
   const auto start = std::chrono::steady_clock::now();
   BundleState state = MakeBundleState(problem, options);
   BundleResult result;
-  double max_error_px = 0.0;
-  bool good = true;
-  const auto run = [&](const std::string& name, const BundleRound& round) {
-    if (!good || !round.enabled) return;
-    max_error_px = round.max_error_px;
-    good = RunRound(problem.camera, name, round, options, state, result);
-  };
-  run("bridge", options.bridge);
-  run("coarse", options.coarse);
-  run("fine", options.fine);
+  Rounds rounds(problem.camera, options, state, result);
+  rounds.Run("bridge", options.bridge);
+  rounds.Run("coarse", options.coarse);
+  rounds.TryLens(options.coarse);
+  rounds.Run("fine", options.fine);
 
   BundleSummary& summary = result.summary;
   for (const BundleRoundSummary& round : summary.rounds) summary.iterations += round.iterations;
@@ -138,12 +178,13 @@ BundleResult RefineBundle(const BundleProblem& problem, const BundleOptions& opt
     summary.initial_cost = summary.rounds.front().initial_cost;
     summary.final_cost = summary.rounds.back().final_cost;
   }
-  if (good) {
-    ClassifyAll(problem.camera, max_error_px, /*retriangulate=*/false, options, state);
-    summary.after = Statistics(problem.camera, state);
+  if (rounds.good()) {
+    ClassifyAll(rounds.max_error_px(), /*retriangulate=*/false, options, state);
+    summary.after = Statistics(state);
     TakeResult(problem, state, result);
     result.message = summary.rounds.back().termination;
   } else {
+    result.camera = problem.camera;
     result.reconstruction = problem.start;
   }
   summary.seconds = SecondsSince(start);
@@ -152,7 +193,7 @@ BundleResult RefineBundle(const BundleProblem& problem, const BundleOptions& opt
 
 Reconstruction TriangulateTracks(const BundleProblem& problem, const BundleOptions& options) {
   BundleState state = MakeBundleState(problem, options);
-  ClassifyAll(problem.camera, options.fine.max_error_px, /*retriangulate=*/true, options, state);
+  ClassifyAll(options.fine.max_error_px, /*retriangulate=*/true, options, state);
   BundleResult result;
   TakeResult(problem, state, result);
   result.reconstruction.center_in_world = problem.start.center_in_world;
