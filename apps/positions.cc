@@ -24,104 +24,6 @@ const HeldStretch* StretchAt(const std::vector<HeldStretch>& held, FrameId frame
   return stretch == held.end() ? nullptr : &*stretch;
 }
 
-// Keyframes of each component of the known-rotation solution, by first keyframe.
-std::vector<MapComponent> ComponentsOf(const KrotSolution& krot) {
-  std::map<int, MapComponent> by_number;
-  for (const auto& [frame, number] : krot.component) {
-    if (krot.center_in_world.contains(frame)) by_number[number].keyframes.insert(frame);
-  }
-  std::vector<MapComponent> components;
-  for (auto& [number, component] : by_number) {
-    if (component.keyframes.size() >= 2) components.push_back(std::move(component));
-  }
-  std::sort(components.begin(), components.end(), [](const MapComponent& a, const MapComponent& b) {
-    return *a.keyframes.begin() < *b.keyframes.begin();
-  });
-  return components;
-}
-
-// Bundle adjustment of one component, in its own scale.
-BundleResult RefineComponent(const MapComponent& component,
-                             const RotationMap& rotations,
-                             const KrotSolution& krot,
-                             const std::vector<Track>& tracks,
-                             const std::vector<HeldStretch>& held,
-                             const Camera& camera,
-                             const BundleOptions& options) {
-  BundleProblem problem;
-  problem.camera = camera;
-  for (const FrameId frame : component.keyframes) {
-    problem.start.cam_from_world[frame] = rotations.at(frame);
-    problem.start.center_in_world[frame] = krot.center_in_world.at(frame);
-  }
-  for (const HeldStretch& stretch : held) {
-    if (component.keyframes.contains(stretch.first) && component.keyframes.contains(stretch.last)) {
-      problem.shared_center[stretch.last] = stretch.first;
-    }
-  }
-  problem.start.tracks = RestrictTracks(tracks, component.keyframes, 2);
-  return RefineBundle(problem, options);
-}
-
-std::vector<Track> WithBearingsOf(const Camera& camera, std::vector<Track> tracks) {
-  for (Track& track : tracks) {
-    for (Observation& observation : track.observations) {
-      const auto bearing = camera.Unproject(observation.keypoint_px);
-      if (bearing) observation.bearing = *bearing;
-    }
-  }
-  return tracks;
-}
-
-// Position of the component with the most observations.
-std::size_t LargestComponent(const std::vector<MapComponent>& components,
-                             const std::vector<Track>& tracks) {
-  std::map<FrameId, int> count;
-  for (const Track& track : tracks) {
-    for (const Observation& observation : track.observations) ++count[observation.frame];
-  }
-  std::size_t largest = 0;
-  int most = 0;
-  for (std::size_t k = 0; k < components.size(); ++k) {
-    int sum = 0;
-    for (const FrameId frame : components[k].keyframes) sum += count[frame];
-    if (sum <= most) continue;
-    most = sum;
-    largest = k;
-  }
-  return largest;
-}
-
-// Bundle adjustment of every component. The largest one refines the lens, the others take it over.
-std::vector<BundleResult> RefineComponents(const std::vector<MapComponent>& components,
-                                           const std::vector<Track>& tracks,
-                                           const BundleOptions& options,
-                                           PositionResult& result) {
-  std::vector<BundleResult> bundles(components.size());
-  if (components.empty()) return bundles;
-  const auto refine =
-      [&](std::size_t k, const std::vector<Track>& seen, const BundleOptions& bundle_options) {
-        bundles[k] = RefineComponent(components[k],
-                                     result.cam_from_world,
-                                     result.krot,
-                                     seen,
-                                     result.held,
-                                     result.camera,
-                                     bundle_options);
-      };
-  const std::size_t first = LargestComponent(components, tracks);
-  refine(first, tracks, options);
-  result.camera = bundles[first].camera;
-  if (components.size() == 1) return bundles;
-  BundleOptions same_lens = options;
-  same_lens.lens.refine_focal = same_lens.lens.refine_distortion = false;
-  const std::vector<Track> seen = WithBearingsOf(result.camera, tracks);
-  for (std::size_t k = 0; k < components.size(); ++k) {
-    if (k != first) refine(k, seen, same_lens);
-  }
-  return bundles;
-}
-
 // x_new = scale * turn * x_old + shift.
 struct Similarity {
   double scale = 1.0;
@@ -372,11 +274,12 @@ PositionResult FindPositions(const Orientations& orientations,
   progress.StartStage("bundle adjustment", -1);
   BundleOptions bundle_options = options.ba;
   bundle_options.num_threads = num_threads;
-  std::vector<MapComponent> components = ComponentsOf(result.krot);
-  std::vector<BundleResult> bundles = RefineComponents(components, tracks, bundle_options, result);
-  for (std::size_t k = 0; k < components.size(); ++k) {
-    MapComponent& component = components[k];
-    BundleResult& bundle = bundles[k];
+  RefinedComponents refined = RefineComponents(
+      keyframe_rotations, result.krot, tracks, result.held, camera, bundle_options);
+  result.camera = refined.camera;
+  for (std::size_t k = 0; k < refined.components.size(); ++k) {
+    MapComponent& component = refined.components[k];
+    BundleResult& bundle = refined.bundles[k];
     if (!bundle.Usable() || bundle.reconstruction.center_in_world.size() < 2) continue;
     if (!result.components.empty()) {
       component.placed_by_default = true;

@@ -6,14 +6,9 @@
 
 #include "apps/orientations.h"
 #include "apps/pipeline.h"
+#include "apps/refinement.h"
 
 namespace rotslam {
-
-/// Keyframes whose relative scale is known: they share tracks with depth.
-struct MapComponent {
-  std::set<FrameId> keyframes;
-  bool placed_by_default = false;  // its scale and place rest on continuity, not on measurements
-};
 
 /// Positions and points, and how they came about.
 struct PositionResult {

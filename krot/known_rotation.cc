@@ -220,6 +220,11 @@ ComponentStart SolvePrograms(const RotationMap& cam_from_world,
       solution.gamma_high == kInfinity ? high : std::max(solution.gamma_high, high);
   solution.num_bracket_observations += static_cast<int>(survivors.observations.size());
   solution.num_bracket_tracks += survivors.num_points;
+  if (options.start == "linear") {
+    auto linear = SolveLinearStart(survivors, options.linear_start);
+    if (!linear) return result;
+    structure = *std::move(linear);
+  }
   for (int view = 0; view < named.problem.num_views(); ++view) {
     result.centers[named.views[view]] = structure.center_in_world[view];
   }
@@ -426,8 +431,8 @@ void Solve(const RotationMap& cam_from_world,
 }  // namespace
 
 std::optional<std::string> KrotOptions::Problem() const {
-  if (start != "l1" && start != "bisection") {
-    return "start is '" + start + "', must be l1 or bisection";
+  if (start != "l1" && start != "bisection" && start != "linear") {
+    return "start is '" + start + "', must be l1, bisection or linear";
   }
   if (start == "bisection" && !use_bracket) {
     return "start is 'bisection', which needs use_bracket";
@@ -457,6 +462,7 @@ std::optional<std::string> KrotOptions::Problem() const {
   }
   if (num_threads < 1) return OutOfRange("num_threads", num_threads, "at least 1");
   if (const auto trouble = robust_start.Problem()) return "robust_start." + *trouble;
+  if (const auto trouble = linear_start.Problem()) return "linear_start." + *trouble;
   if (const auto trouble = bisection.Problem()) return "bisection." + *trouble;
   return std::nullopt;
 }

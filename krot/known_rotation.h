@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "krot/bisection.h"
+#include "krot/linear_start.h"
 #include "krot/lp.h"
 #include "krot/robust_start.h"
 #include "rotodom/camera/camera.h"
@@ -17,7 +18,9 @@ namespace rotslam {
 
 struct KrotOptions {
   // Which answer gives the positions: "l1", the least sum of misses, forgives outliers and is the
-  // better start for bundle adjustment; "bisection", the least largest residual of what l1 kept.
+  // better start for bundle adjustment; "bisection", the least largest residual of what l1 kept;
+  // "linear", equations between the centres (SolveLinearStart) on the same. All lead bundle
+  // adjustment to one minimum.
   // The bracket is found either way (see use_bracket).
   std::string start = "l1";
   // Image bound of the L1 start: observations within it cost nothing. It must cover feature noise
@@ -50,6 +53,7 @@ struct KrotOptions {
   // out of the linear programs (they are triangulated all the same).
   double max_off_axis_deg = 80.0;
   RobustStartOptions robust_start;
+  LinearStartOptions linear_start;
   BisectionOptions bisection;
   std::uint64_t seed = 1;
   int num_threads = 1;
@@ -72,6 +76,7 @@ struct KrotOptions {
     visit("use_epipolar_filter", use_epipolar_filter);
     visit("max_off_axis_deg", max_off_axis_deg);
     visit("robust_start", robust_start);
+    visit("linear_start", linear_start);
     visit("bisection", bisection);
     visit("seed", seed);
   }
