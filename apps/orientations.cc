@@ -1,6 +1,7 @@
 #include "apps/orientations.h"
 
 #include <algorithm>
+#include <cmath>
 #include <iterator>
 #include <stdexcept>
 #include <utility>
@@ -116,6 +117,14 @@ Orientations FindOrientations(Input& input,
                   " matches none before it; the turn across this gap is extrapolated");
   }
   return orientations;
+}
+
+std::map<FrameId, double> OrientationSigmas(const Orientations& orientations) {
+  std::map<FrameId, double> sigma_rad;
+  for (const auto& [frame, covariance] : orientations.covariance) {
+    sigma_rad[frame] = std::sqrt(covariance.trace() / 3.0);
+  }
+  return sigma_rad;
 }
 
 Trajectory RotationTrajectory(const Orientations& orientations) {

@@ -248,7 +248,8 @@ PositionResult FindPositions(const Orientations& orientations,
       FindHeldStretches(orientations.graph, result.cam_from_world, options.held_stretches);
   result.keyframes =
       SelectKeyframes(result.cam_from_world, all_tracks, result.held, options.keyframes);
-  const std::vector<Track> tracks = RestrictTracks(all_tracks, result.keyframes, 3);
+  result.keyframe_tracks = RestrictTracks(all_tracks, result.keyframes, 3);
+  const std::vector<Track>& tracks = result.keyframe_tracks;
   progress.EndStage(std::to_string(result.keyframes.size()) + " keyframes, " +
                     std::to_string(tracks.size()) + " tracks, " +
                     std::to_string(result.held.size()) + " pure-rotation stretches");

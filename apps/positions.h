@@ -18,6 +18,7 @@ struct PositionResult {
   Reconstruction cloud;        // every frame, and every deep enough track that its poses explain
   Camera camera;               // as the map's largest component has refined it
   std::set<FrameId> keyframes;
+  std::vector<Track> keyframe_tracks;  // as they went into the known-rotation problem
   std::vector<HeldStretch> held;
   std::vector<MapComponent> components;  // by their first keyframe
   KrotSolution krot;
