@@ -249,12 +249,18 @@ void AddBundles(const std::vector<BundleSummary>& bundles,
                             {"lens.k1", camera.distortion[0]},
                             {"lens.k2", camera.distortion[1]}};
   double bundle_seconds = 0.0;
+  std::map<std::string, std::int64_t> iterations_of;
+  std::map<std::string, double> seconds_of;
   for (const BundleSummary& bundle : bundles) {
     bundle_seconds += bundle.seconds;
     for (const BundleRoundSummary& round : bundle.rounds) {
-      summary.ba->push_back({"iterations_of." + round.name, std::int64_t{round.iterations}});
-      summary.seconds.push_back({"bundle_" + round.name, round.seconds});
+      iterations_of[round.name] += round.iterations;
+      seconds_of[round.name] += round.seconds;
     }
+  }
+  for (const auto& [name, number] : iterations_of) {
+    summary.ba->push_back({"iterations_of." + name, number});
+    summary.seconds.push_back({"bundle_" + name, seconds_of[name]});
   }
   summary.seconds.push_back({"bundle_adjustment", bundle_seconds});
 }

@@ -36,7 +36,7 @@ RunSummary StartSummary(const std::string& command,
 /// The parts that only `run` has.
 void AddPositions(const PositionResult& positions, const Camera& camera, RunSummary& summary);
 
-/// The parts that `run` and `solve` share. Seconds per round are of the last component that had it.
+/// The parts that `run` and `solve` share.
 void AddKnownRotation(const KrotSolution& solution, const Camera& camera, RunSummary& summary);
 void AddBundles(const std::vector<BundleSummary>& bundles,
                 const Camera& camera,

@@ -2,6 +2,8 @@
 
 #include <algorithm>
 #include <chrono>
+#include <cstdint>
+#include <numeric>
 #include <utility>
 
 #include "ba/bundle_state.h"
@@ -22,41 +24,105 @@ bool AllFinite(const BundleState& state) {
   });
 }
 
+// Numbers in no order, the same everywhere (splitmix64).
+std::uint64_t Scramble(std::uint64_t value) {
+  std::uint64_t z = value + 0x9E3779B97F4A7C15ull;
+  z = (z ^ (z >> 30)) * 0xBF58476D1CE4E5B9ull;
+  z = (z ^ (z >> 27)) * 0x94D049BB133111EBull;
+  return z ^ (z >> 31);
+}
+
+// The state with tracks drawn at random until every frame has `num_wanted` observations.
+BundleState WithSomeTracks(const BundleState& state, int num_wanted) {
+  std::vector<std::size_t> order(state.tracks.size());
+  std::iota(order.begin(), order.end(), std::size_t{0});
+  std::sort(order.begin(), order.end(), [](std::size_t a, std::size_t b) {
+    return Scramble(a) < Scramble(b);
+  });
+  std::vector<int> count(state.frames.size(), 0);
+  std::vector<bool> taken(state.tracks.size(), false);
+  for (const std::size_t t : order) {
+    const std::vector<Sight>& sights = state.tracks[t].sights;
+    taken[t] = std::any_of(sights.begin(), sights.end(), [&](const Sight& sight) {
+      return count[sight.frame] < num_wanted;
+    });
+    if (!taken[t]) continue;
+    for (const Sight& sight : sights) ++count[sight.frame];
+  }
+  BundleState part;
+  part.camera = state.camera;
+  part.frames = state.frames;
+  part.centers = state.centers;
+  for (std::size_t t = 0; t < state.tracks.size(); ++t) {
+    if (taken[t]) part.tracks.push_back(state.tracks[t]);
+  }
+  return part;
+}
+
+// Takes the cameras over from a part.
+void TakeCameras(const BundleState& part, BundleState& state) {
+  state.frames = part.frames;
+  state.centers = part.centers;
+  if (part.camera != state.camera) SetCamera(part.camera, state);
+}
+
+std::vector<bool> UsedFlags(const BundleState& state) {
+  std::vector<bool> flags;
+  for (const TrackState& track : state.tracks) {
+    for (const Sight& sight : track.sights) flags.push_back(sight.used);
+  }
+  return flags;
+}
+
 // The rounds of one problem, one after the other.
 class Rounds {
  public:
-  Rounds(const Camera& calibrated,
-         const BundleOptions& options,
-         BundleState& state,
-         BundleResult& result)
-      : calibrated_(calibrated), options_(options), state_(state), result_(result) {}
+  Rounds(const Camera& calibrated, const BundleOptions& options, BundleResult& result)
+      : calibrated_(calibrated), options_(options), result_(result) {}
 
   // Classifies and minimises, as long as nothing has gone wrong.
-  void Run(const std::string& name, const BundleRound& round) {
+  void Run(const std::string& name, const BundleRound& round, BundleState& state) {
     if (!good_ || !round.enabled) return;
     const auto start = std::chrono::steady_clock::now();
     max_error_px_ = round.max_error_px;
-    ClassifyAll(round.max_error_px, /*retriangulate=*/true, options_, state_);
-    const ResidualStatistics before = Statistics(state_);
+    ClassifyAll(round.max_error_px, /*retriangulate=*/true, options_, state);
+    const ResidualStatistics before = Statistics(state);
     const bool is_first = result_.summary.rounds.empty();
-    Minimise(name, round, start);
+    Minimise(name, round, start, state);
     if (good_ && is_first) result_.summary.before = before;
   }
 
+  // The same, until classification changes next to nothing.
+  void Repeat(const std::string& name, const BundleRound& round, BundleState& state) {
+    Run(name, round, state);
+    for (int k = 1; k < options_.max_fine_rounds; ++k) {
+      if (!good_ || !round.enabled) return;
+      const auto start = std::chrono::steady_clock::now();
+      const std::vector<bool> before = UsedFlags(state);
+      ClassifyAll(round.max_error_px, /*retriangulate=*/true, options_, state);
+      const std::vector<bool> after = UsedFlags(state);
+      std::size_t changed = 0;
+      for (std::size_t o = 0; o < after.size(); ++o) changed += before[o] != after[o] ? 1 : 0;
+      const auto total = static_cast<double>(std::count(after.begin(), after.end(), true));
+      if (static_cast<double>(changed) <= options_.max_changed_share * total) return;
+      Minimise(name, round, start, state);
+    }
+  }
+
   // Lets the lens move on the observations of the round before; keeps that when it gains enough.
-  void TryLens(const BundleRound& round) {
+  void TryLens(const BundleRound& round, BundleState& state) {
     const LensOptions& lens = options_.lens;
     if (!good_ || !round.enabled) return;
     if (!lens.refine_focal && !lens.refine_distortion) return;
-    const BundleState before = state_;
+    const BundleState before = state;
     refine_lens_ = true;
-    Minimise("lens", round, std::chrono::steady_clock::now());
+    Minimise("lens", round, std::chrono::steady_clock::now(), state);
     if (!good_) return;
     const BundleRoundSummary& summary = result_.summary.rounds.back();
     result_.summary.lens_gain = 1.0 - summary.final_cost / summary.initial_cost;
     refine_lens_ = result_.summary.lens_gain >= lens.min_gain;
     result_.summary.lens_refined = refine_lens_;
-    if (!refine_lens_) state_ = before;
+    if (!refine_lens_) state = before;
   }
 
   bool good() const { return good_; }
@@ -65,10 +131,11 @@ class Rounds {
  private:
   void Minimise(const std::string& name,
                 const BundleRound& round,
-                std::chrono::steady_clock::time_point start) {
+                std::chrono::steady_clock::time_point start,
+                BundleState& state) {
     const auto solver_start = std::chrono::steady_clock::now();
     const std::optional<MinimisationResult> minimised =
-        rotslam::Minimise(calibrated_, round, refine_lens_, options_, state_);
+        rotslam::Minimise(calibrated_, round, refine_lens_, options_, state);
     good_ = minimised.has_value();
     if (!minimised) {
       result_.status = BundleStatus::kTooLittleData;
@@ -87,7 +154,7 @@ class Rounds {
     summary.solver_seconds = SecondsSince(solver_start);
     summary.seconds = SecondsSince(start);
     result_.summary.rounds.push_back(summary);
-    good_ = solved.IsSolutionUsable() && AllFinite(state_);
+    good_ = solved.IsSolutionUsable() && AllFinite(state);
     if (!good_) {
       result_.status = BundleStatus::kSolverFailed;
       result_.message = "round " + name + ": " + solved.message;
@@ -99,7 +166,6 @@ class Rounds {
 
   const Camera& calibrated_;
   const BundleOptions& options_;
-  BundleState& state_;
   BundleResult& result_;
   bool good_ = true;
   bool refine_lens_ = false;
@@ -166,11 +232,16 @@ BundleResult RefineBundle(const BundleProblem& problem, const BundleOptions& opt
   const auto start = std::chrono::steady_clock::now();
   BundleState state = MakeBundleState(problem, options);
   BundleResult result;
-  Rounds rounds(problem.camera, options, state, result);
-  rounds.Run("bridge", options.bridge);
-  rounds.Run("coarse", options.coarse);
-  rounds.TryLens(options.coarse);
-  rounds.Run("fine", options.fine);
+  Rounds rounds(problem.camera, options, result);
+  const bool in_part = options.preparing_observations > 0 && options.fine.enabled;
+  std::optional<BundleState> part;
+  if (in_part) part = WithSomeTracks(state, options.preparing_observations);
+  BundleState& preparing = part ? *part : state;
+  rounds.Run("bridge", options.bridge, preparing);
+  rounds.Run("coarse", options.coarse, preparing);
+  rounds.TryLens(options.coarse, preparing);
+  if (part) TakeCameras(*part, state);
+  rounds.Repeat("fine", options.fine, state);
 
   BundleSummary& summary = result.summary;
   for (const BundleRoundSummary& round : summary.rounds) summary.iterations += round.iterations;

@@ -33,6 +33,13 @@ std::optional<std::string> BundleOptions::Problem() const {
   if (!bridge.enabled && !coarse.enabled && !fine.enabled) {
     return "fine.enabled is false, must be true for one of bridge, coarse and fine";
   }
+  if (preparing_observations < 0) {
+    return OutOfRange("preparing_observations", preparing_observations, "at least 0");
+  }
+  if (max_fine_rounds < 1) return OutOfRange("max_fine_rounds", max_fine_rounds, "at least 1");
+  if (!(max_changed_share >= 0.0)) {
+    return OutOfRange("max_changed_share", max_changed_share, "at least 0");
+  }
   if (min_observations < 2) {
     return OutOfRange("min_observations", min_observations, "at least 2");
   }

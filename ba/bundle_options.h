@@ -21,6 +21,8 @@ struct BundleRound {
   double loss_scale = 1.0;
   // Levenberg-Marquardt steps.
   int max_iterations = 30;
+  // Trust region at the start; a large one makes the first step a Gauss-Newton step.
+  double initial_radius = 1e6;
   // Stop when a step changes the cost by less than this share. Rounds that only prepare the next
   // one do not need their last digits.
   double function_tolerance = 1e-4;
@@ -35,6 +37,7 @@ struct BundleRound {
     visit("loss", loss);
     visit("loss_scale", loss_scale);
     visit("max_iterations", max_iterations);
+    visit("initial_radius", initial_radius);
     visit("function_tolerance", function_tolerance);
   }
 };
@@ -79,7 +82,15 @@ struct BundleOptions {
   // What is within 4 px of the bridge, rotations free.
   BundleRound coarse = {.max_error_px = 4.0};
   // What is within 2 px of that. Its `max_error_px` also decides what the result keeps.
-  BundleRound fine = {.max_error_px = 2.0, .max_iterations = 50, .function_tolerance = 1e-6};
+  BundleRound fine = {.max_error_px = 2.0, .max_iterations = 50, .function_tolerance = 1e-5};
+  // The rounds before the last one take tracks at random until every frame has so many
+  // observations: enough to say where cameras are, at a third of the time. 0: all. The longest
+  // tracks would do worse: they are those that the lens' errors and the tracker's drift bend most.
+  int preparing_observations = 300;
+  // The last round is repeated, at most so many times in all, until classification changes less
+  // than this share of the observations: then the result does not depend on where it started.
+  int max_fine_rounds = 4;
+  double max_changed_share = 2e-4;
   // false holds the rotations in every round: they come out bit by bit as they went in.
   bool refine_rotations = true;
   LensOptions lens;
@@ -111,6 +122,9 @@ struct BundleOptions {
     visit("bridge", bridge);
     visit("coarse", coarse);
     visit("fine", fine);
+    visit("preparing_observations", preparing_observations);
+    visit("max_fine_rounds", max_fine_rounds);
+    visit("max_changed_share", max_changed_share);
     visit("refine_rotations", refine_rotations);
     visit("lens", lens);
     visit("min_observations", min_observations);

@@ -77,6 +77,7 @@ class Minimisation {
     options.function_tolerance = round.function_tolerance;
     options.gradient_tolerance = 0.0;
     options.parameter_tolerance = 1e-12;
+    options.initial_trust_region_radius = round.initial_radius;
     options.max_trust_region_radius = kMaxTrustRegionRadius;
     options.logging_type = ceres::SILENT;
     ceres::Solver::Summary summary;
