@@ -246,7 +246,12 @@ BundleResult RefineBundle(const BundleProblem& problem, const BundleOptions& opt
   BundleSummary& summary = result.summary;
   for (const BundleRoundSummary& round : summary.rounds) summary.iterations += round.iterations;
   if (!summary.rounds.empty()) {
-    summary.initial_cost = summary.rounds.front().initial_cost;
+    const auto whole = std::find_if(
+        summary.rounds.begin(), summary.rounds.end(), [](const BundleRoundSummary& round) {
+          return round.name == "fine";
+        });
+    const auto first = whole == summary.rounds.end() ? summary.rounds.begin() : whole;
+    summary.initial_cost = first->initial_cost;
     summary.final_cost = summary.rounds.back().final_cost;
   }
   if (rounds.good()) {

@@ -62,7 +62,7 @@ struct BundleRoundSummary {
 };
 
 struct BundleSummary {
-  double initial_cost = 0.0;  // of the first round
+  double initial_cost = 0.0;  // of the first round that takes all tracks
   double final_cost = 0.0;    // of the last
   int iterations = 0;         // of all rounds
   ResidualStatistics before;  // observations of the first round, before its solve
