@@ -265,7 +265,8 @@ PositionResult FindPositions(const Orientations& orientations,
     keyframe_rotations[frame] = result.cam_from_world.at(frame);
   KrotOptions krot_options = options.krot;
   krot_options.num_threads = num_threads;
-  result.krot = SolveKnownRotation(keyframe_rotations, tracks, camera, krot_options);
+  result.krot = SolveKnownRotation(
+      keyframe_rotations, tracks, camera, krot_options, OrientationSigmas(orientations));
   progress.EndStage(result.krot.message);
   if (!result.krot.Usable()) {
     std::string failure = result.krot.message;

@@ -154,8 +154,8 @@ int Solve(const SolveFlags& flags) {
   const std::filesystem::path directory = PrepareRunDirectory(flags.out);
 
   progress.StartStage("known rotation", -1);
-  const KrotSolution krot =
-      SolveKnownRotation(input.cam_from_world, input.tracks, input.camera, options.krot);
+  const KrotSolution krot = SolveKnownRotation(
+      input.cam_from_world, input.tracks, input.camera, options.krot, input.sigma_rad);
   progress.EndStage(krot.message);
   if (!krot.Usable()) throw std::runtime_error(flags.input + ": " + krot.message);
 
