@@ -33,6 +33,7 @@ void AddCommonFlags(CLI::App& command, CommonFlags& flags);
 // One file per subcommand. Each adds its subcommand to `app` and sets `action` once it is parsed.
 void AddRunCommand(CLI::App& app, Action& action);
 void AddRotationsCommand(CLI::App& app, Action& action);
+void AddSolveCommand(CLI::App& app, Action& action);
 void AddSimulateCommand(CLI::App& app, Action& action);
 void AddAverageCommand(CLI::App& app, Action& action);
 void AddEvalCommand(CLI::App& app, Action& action);

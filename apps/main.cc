@@ -55,6 +55,7 @@ int main(int argc, char** argv) {
     rotslam::Action action;
     rotslam::AddRunCommand(app, action);
     rotslam::AddRotationsCommand(app, action);
+    rotslam::AddSolveCommand(app, action);
     rotslam::AddAverageCommand(app, action);
     rotslam::AddEvalCommand(app, action);
     rotslam::AddSimulateCommand(app, action);

@@ -145,6 +145,14 @@ Orientations FindOrientations(Input& input,
   return orientations;
 }
 
+std::map<FrameId, double> OrientationSigmas(const Orientations& orientations) {
+  std::map<FrameId, double> sigma_rad;
+  for (const auto& [frame, covariance] : orientations.covariance) {
+    sigma_rad[frame] = std::sqrt(covariance.trace() / 3.0);
+  }
+  return sigma_rad;
+}
+
 Trajectory RotationTrajectory(const Orientations& orientations) {
   Trajectory trajectory;
   for (const auto& [frame, cam_from_world] : orientations.cam_from_world) {

@@ -46,6 +46,10 @@ Orientations FindOrientations(Input& input,
 /// that have one; again once these have been refined.
 void InterpolateUnconnected(const Orientations& orientations, RotationMap& cam_from_world);
 
+/// Standard deviation of every orientation whose covariance is known, rad: the root of the mean
+/// variance about its three axes, against the first frame.
+std::map<FrameId, double> OrientationSigmas(const Orientations& orientations);
+
 /// Camera->world poses from orientations alone, positions zero.
 Trajectory RotationTrajectory(const Orientations& orientations);
 

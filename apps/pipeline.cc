@@ -1,5 +1,7 @@
 #include "apps/pipeline.h"
 
+#include <stdexcept>
+
 #include "apps/config.h"
 #include "rotodom/types/options.h"
 
@@ -17,6 +19,27 @@ std::optional<std::string> PipelineOptions::Problem() const {
     return OutOfRange("cloud_min_angle_deg", cloud_min_angle_deg, "zero or more");
   }
   return std::nullopt;
+}
+
+void KrotFlags::Override(KrotOptions& options) const {
+  if (!start.empty()) options.start = start;
+  if (!no_certificate) return;
+  options.use_bracket = false;
+  if (options.start != "bisection") return;
+  throw std::runtime_error(
+      "--no-certificate leaves out the bisection that --krot bisection asks for");
+}
+
+void AddKrotFlags(CLI::App& command, KrotFlags& flags) {
+  command
+      .add_option("--krot",
+                  flags.start,
+                  "Which answer bundle adjustment starts from: l1 (least sum of misses; default), "
+                  "bisection (least largest residual) or linear (equations between the centres)")
+      ->check(CLI::IsMember({"l1", "bisection", "linear"}));
+  command.add_flag("--no-certificate",
+                   flags.no_certificate,
+                   "Do not bound how far the largest residual is from the least possible");
 }
 
 PipelineOptions ReadPipelineOptions(const CommonFlags& common, const InputFlags& input) {

@@ -45,6 +45,16 @@ struct PipelineOptions {
   }
 };
 
+/// What `run` and `solve` take about the known-rotation solver.
+struct KrotFlags {
+  std::string start;  // empty: as the configuration says
+  bool no_certificate = false;
+
+  void Override(KrotOptions& options) const;
+};
+
+void AddKrotFlags(CLI::App& command, KrotFlags& flags);
+
 /// The defaults, overridden by the configuration file and then by the flags.
 PipelineOptions ReadPipelineOptions(const CommonFlags& common, const InputFlags& input);
 

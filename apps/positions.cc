@@ -24,45 +24,6 @@ const HeldStretch* StretchAt(const std::vector<HeldStretch>& held, FrameId frame
   return stretch == held.end() ? nullptr : &*stretch;
 }
 
-// Keyframes of each component of the known-rotation solution, by first keyframe.
-std::vector<MapComponent> ComponentsOf(const KrotSolution& krot) {
-  std::map<int, MapComponent> by_number;
-  for (const auto& [frame, number] : krot.component) {
-    if (krot.center_in_world.contains(frame)) by_number[number].keyframes.insert(frame);
-  }
-  std::vector<MapComponent> components;
-  for (auto& [number, component] : by_number) {
-    if (component.keyframes.size() >= 2) components.push_back(std::move(component));
-  }
-  std::sort(components.begin(), components.end(), [](const MapComponent& a, const MapComponent& b) {
-    return *a.keyframes.begin() < *b.keyframes.begin();
-  });
-  return components;
-}
-
-// Bundle adjustment of one component, in its own scale.
-BundleResult RefineComponent(const MapComponent& component,
-                             const RotationMap& rotations,
-                             const KrotSolution& krot,
-                             const std::vector<Track>& tracks,
-                             const std::vector<HeldStretch>& held,
-                             const Camera& camera,
-                             const BundleOptions& options) {
-  BundleProblem problem;
-  problem.camera = camera;
-  for (const FrameId frame : component.keyframes) {
-    problem.start.cam_from_world[frame] = rotations.at(frame);
-    problem.start.center_in_world[frame] = krot.center_in_world.at(frame);
-  }
-  for (const HeldStretch& stretch : held) {
-    if (component.keyframes.contains(stretch.first) && component.keyframes.contains(stretch.last)) {
-      problem.shared_center[stretch.last] = stretch.first;
-    }
-  }
-  problem.start.tracks = RestrictTracks(tracks, component.keyframes, 2);
-  return RefineBundle(problem, options);
-}
-
 // x_new = scale * turn * x_old + shift.
 struct Similarity {
   double scale = 1.0;
@@ -278,15 +239,17 @@ PositionResult FindPositions(const Orientations& orientations,
                              Progress& progress) {
   PositionResult result;
   result.cam_from_world = orientations.cam_from_world;
+  result.camera = camera;
 
   progress.StartStage("tracks", -1);
-  const std::vector<Track> all_tracks = BuildTracks(
+  std::vector<Track> all_tracks = BuildTracks(
       orientations.edge_matches, orientations.features, AllFrames(result.cam_from_world), 2);
   result.held =
       FindHeldStretches(orientations.graph, result.cam_from_world, options.held_stretches);
   result.keyframes =
       SelectKeyframes(result.cam_from_world, all_tracks, result.held, options.keyframes);
-  const std::vector<Track> tracks = RestrictTracks(all_tracks, result.keyframes, 3);
+  result.keyframe_tracks = RestrictTracks(all_tracks, result.keyframes, 3);
+  const std::vector<Track>& tracks = result.keyframe_tracks;
   progress.EndStage(std::to_string(result.keyframes.size()) + " keyframes, " +
                     std::to_string(tracks.size()) + " tracks, " +
                     std::to_string(result.held.size()) + " pure-rotation stretches");
@@ -302,7 +265,8 @@ PositionResult FindPositions(const Orientations& orientations,
     keyframe_rotations[frame] = result.cam_from_world.at(frame);
   KrotOptions krot_options = options.krot;
   krot_options.num_threads = num_threads;
-  result.krot = SolveKnownRotation(keyframe_rotations, tracks, camera, krot_options);
+  result.krot = SolveKnownRotation(
+      keyframe_rotations, tracks, camera, krot_options, OrientationSigmas(orientations));
   progress.EndStage(result.krot.message);
   if (!result.krot.Usable()) {
     std::string failure = result.krot.message;
@@ -312,9 +276,12 @@ PositionResult FindPositions(const Orientations& orientations,
   progress.StartStage("bundle adjustment", -1);
   BundleOptions bundle_options = options.ba;
   bundle_options.num_threads = num_threads;
-  for (MapComponent& component : ComponentsOf(result.krot)) {
-    BundleResult bundle = RefineComponent(
-        component, result.cam_from_world, result.krot, tracks, result.held, camera, bundle_options);
+  RefinedComponents refined = RefineComponents(
+      keyframe_rotations, result.krot, tracks, result.held, camera, bundle_options);
+  result.camera = refined.camera;
+  for (std::size_t k = 0; k < refined.components.size(); ++k) {
+    MapComponent& component = refined.components[k];
+    BundleResult& bundle = refined.bundles[k];
     if (!bundle.Usable() || bundle.reconstruction.center_in_world.size() < 2) continue;
     if (!result.components.empty()) {
       component.placed_by_default = true;
@@ -337,19 +304,21 @@ PositionResult FindPositions(const Orientations& orientations,
     return WithoutMap(std::move(result), "bundle adjustment found no usable map");
   }
   progress.EndStage(std::to_string(result.map.point_in_world.size()) + " points, mean error " +
-                    std::to_string(result.bundles.front().after.mean_px) + " px");
+                    std::to_string(result.bundles.front().after.mean_px) + " px, " +
+                    Describe(result.camera));
 
   progress.StartStage("frames between keyframes", -1);
+  all_tracks = WithBearingsOf(result.camera, std::move(all_tracks));
   PlaceRemainingFrames(
-      all_tracks, orientations.timestamps_s, camera, options.resection, num_threads, result);
+      all_tracks, orientations.timestamps_s, result.camera, options.resection, num_threads, result);
   // Their neighbours have moved a little since.
   InterpolateUnconnected(orientations, result.cam_from_world);
   progress.EndStage(std::to_string(result.num_resected) + " resected, " +
                     std::to_string(result.num_interpolated) + " interpolated");
 
   progress.StartStage("cloud", -1);
-  result.cloud = WithoutShallowPoints(MakeCloudOf(result, all_tracks, camera, bundle_options),
-                                      options.cloud_min_angle_deg);
+  result.cloud = WithoutShallowPoints(
+      MakeCloudOf(result, all_tracks, result.camera, bundle_options), options.cloud_min_angle_deg);
   progress.EndStage(std::to_string(result.cloud.point_in_world.size()) + " points");
   return result;
 }

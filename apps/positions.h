@@ -6,14 +6,9 @@
 
 #include "apps/orientations.h"
 #include "apps/pipeline.h"
+#include "apps/refinement.h"
 
 namespace rotslam {
-
-/// Keyframes whose relative scale is known: they share tracks with depth.
-struct MapComponent {
-  std::set<FrameId> keyframes;
-  bool placed_by_default = false;  // its scale and place rest on continuity, not on measurements
-};
 
 /// Positions and points, and how they came about.
 struct PositionResult {
@@ -21,7 +16,9 @@ struct PositionResult {
   CenterMap center_in_world;   // of every frame
   Reconstruction map;          // refined keyframes, points and their tracks
   Reconstruction cloud;        // every frame, and every deep enough track that its poses explain
+  Camera camera;               // as the map's largest component has refined it
   std::set<FrameId> keyframes;
+  std::vector<Track> keyframe_tracks;  // as they went into the known-rotation problem
   std::vector<HeldStretch> held;
   std::vector<MapComponent> components;  // by their first keyframe
   KrotSolution krot;

@@ -20,6 +20,7 @@ using Clock = std::chrono::steady_clock;
 struct RunFlags {
   CommonFlags common;
   InputFlags input;
+  KrotFlags krot;
 };
 
 double SecondsSince(Clock::time_point start) {
@@ -29,7 +30,8 @@ double SecondsSince(Clock::time_point start) {
 int Run(const RunFlags& flags) {
   const Clock::time_point start = Clock::now();
   Progress progress(flags.common.quiet);
-  const PipelineOptions options = ReadPipelineOptions(flags.common, flags.input);
+  PipelineOptions options = ReadPipelineOptions(flags.common, flags.input);
+  flags.krot.Override(options.krot);
 
   Input input = OpenInput(
       flags.input, options.sequence, [&](const std::string& line) { progress.Say(line); });
@@ -43,7 +45,8 @@ int Run(const RunFlags& flags) {
   const PositionResult positions =
       FindPositions(orientations, input.camera, options, flags.common.NumThreads(), progress);
   const double positions_s = SecondsSince(start) - orientations_s;
-  WritePositions(directory, orientations, positions, input.camera);
+  WritePositions(directory, orientations, positions, positions.camera);
+  WriteKnownRotationInput(directory, orientations, positions, input.camera);
 
   RunSummary summary = StartSummary("run", input, orientations, DescribeOptions(options));
   AddPositions(positions, input.camera, summary);
@@ -65,6 +68,7 @@ int Run(const RunFlags& flags) {
       "wrote " + directory.string() +
       ": trajectory_tum.txt, trajectory_kitti.txt, keyframes_tum.txt, "
       "rotations_tum.txt, rotations.csv, loops.csv, cloud.ply, segments.csv, view_graph.g2o, "
+      "known_rotation.txt, "
       "summary.json");
   if (positions.failure.empty()) return 0;
   throw std::runtime_error("orientations are in " + directory.string() +
@@ -78,6 +82,7 @@ void AddRunCommand(CLI::App& app, Action& action) {
   CLI::App* command = app.add_subcommand(
       "run", "The whole chain: a sequence goes in, a trajectory and a point cloud come out");
   AddInputFlags(*command, flags->input);
+  AddKrotFlags(*command, flags->krot);
   AddCommonFlags(*command, flags->common);
   command->footer("Example: rotslam run kitti/sequences/00 --out runs/kitti00");
   command->callback([flags, &action] { action = [flags] { return Run(*flags); }; });

@@ -9,6 +9,7 @@
 
 #include "output/atomic_file.h"
 #include "output/g2o.h"
+#include "output/known_rotation_file.h"
 #include "output/loops_csv.h"
 #include "output/ply.h"
 #include "output/rotations_csv.h"
@@ -106,6 +107,21 @@ void WritePositions(const std::filesystem::path& directory,
   WriteSegments(directory / "segments.csv", Segments(positions));
 }
 
+void WriteKnownRotationInput(const std::filesystem::path& directory,
+                             const Orientations& orientations,
+                             const PositionResult& positions,
+                             const Camera& camera) {
+  KnownRotationInput input;
+  input.camera = camera;
+  for (const FrameId frame : positions.keyframes) {
+    input.cam_from_world[frame] = orientations.cam_from_world.at(frame);
+    input.timestamp_s[frame] = orientations.timestamps_s[frame.value];
+  }
+  input.sigma_rad = OrientationSigmas(orientations);
+  input.tracks = positions.keyframe_tracks;
+  WriteKnownRotation(directory / "known_rotation.txt", input);
+}
+
 RunSummary StartSummary(const std::string& command,
                         const Input& input,
                         const Orientations& orientations,
@@ -169,45 +185,84 @@ void AddPositions(const PositionResult& positions, const Camera& camera, RunSumm
   summary.counts.push_back({"resected_frames", std::int64_t{positions.num_resected}});
   summary.counts.push_back({"interpolated_frames", std::int64_t{positions.num_interpolated}});
   summary.segments = Segments(positions);
+  AddKnownRotation(positions.krot, camera, summary);
+  AddBundles(positions.bundles, positions.camera, summary);
+}
 
+void AddKnownRotation(const KrotSolution& solution, const Camera& camera, RunSummary& summary) {
   SummaryKrot krot;
-  krot.status = ToString(positions.krot.status);
-  krot.gamma_low = positions.krot.gamma_low;
-  krot.gamma_high = positions.krot.gamma_high;
-  krot.gamma_low_px = positions.krot.gamma_low * camera.MeanFocal();
-  krot.gamma_high_px = positions.krot.gamma_high * camera.MeanFocal();
-  krot.removed = count(positions.krot.removed.size());
-  krot.more = {{"message", positions.krot.message}};
+  krot.status = ToString(solution.status);
+  krot.gamma_low = solution.gamma_low;
+  krot.gamma_high = solution.gamma_high;
+  krot.gamma_low_px = solution.gamma_low * camera.MeanFocal();
+  krot.gamma_high_px = solution.gamma_high * camera.MeanFocal();
+  krot.removed = static_cast<std::int64_t>(solution.removed.size());
+  krot.more = {{"message", solution.message},
+               {"bracket_observations", std::int64_t{solution.num_bracket_observations}},
+               {"bracket_tracks", std::int64_t{solution.num_bracket_tracks}},
+               {"programs", std::int64_t{solution.num_programs}}};
+  std::map<RemovalReason, std::int64_t> removed;
+  for (const RemovedObservation& observation : solution.removed) ++removed[observation.reason];
+  for (const auto& [reason, number] : removed) {
+    krot.more.push_back({"removed_for." + ToString(reason), number});
+  }
   summary.krot = krot;
-  if (positions.bundles.empty()) return;
+  summary.seconds.push_back({"known_rotation", solution.seconds});
+}
+
+void AddBundles(const std::vector<BundleSummary>& bundles,
+                const Camera& camera,
+                RunSummary& summary) {
+  if (bundles.empty()) return;
 
   // Sums over the components; means are weighted by their observations.
   std::int64_t observations = 0;
+  std::int64_t dropped = 0;
   std::int64_t iterations = 0;
   double initial_cost = 0.0;
   double final_cost = 0.0;
   double error_sum_px = 0.0;
-  for (const BundleSummary& bundle : positions.bundles) {
+  for (const BundleSummary& bundle : bundles) {
     observations += bundle.num_observations;
+    dropped += bundle.num_dropped_observations;
     iterations += bundle.iterations;
     initial_cost += bundle.initial_cost;
     final_cost += bundle.final_cost;
     error_sum_px += bundle.after.mean_px * bundle.num_observations;
   }
-  const ResidualStatistics& largest =
-      std::max_element(positions.bundles.begin(),
-                       positions.bundles.end(),
-                       [](const BundleSummary& a, const BundleSummary& b) {
-                         return a.num_observations < b.num_observations;
-                       })
-          ->after;
+  const BundleSummary& largest = *std::max_element(
+      bundles.begin(), bundles.end(), [](const BundleSummary& a, const BundleSummary& b) {
+        return a.num_observations < b.num_observations;
+      });
   summary.ba = SummaryTable{{"observations", observations},
+                            {"dropped_observations", dropped},
                             {"iterations", iterations},
                             {"initial_cost", initial_cost},
                             {"final_cost", final_cost},
                             {"mean_error_px", error_sum_px / static_cast<double>(observations)},
-                            {"median_error_px", largest.median_px},
-                            {"p90_error_px", largest.p90_px}};
+                            {"median_error_px", largest.after.median_px},
+                            {"p90_error_px", largest.after.p90_px},
+                            {"lens.gain", largest.lens_gain},
+                            {"lens.refined", largest.lens_refined},
+                            {"lens.fx", camera.fx},
+                            {"lens.fy", camera.fy},
+                            {"lens.k1", camera.distortion[0]},
+                            {"lens.k2", camera.distortion[1]}};
+  double bundle_seconds = 0.0;
+  std::map<std::string, std::int64_t> iterations_of;
+  std::map<std::string, double> seconds_of;
+  for (const BundleSummary& bundle : bundles) {
+    bundle_seconds += bundle.seconds;
+    for (const BundleRoundSummary& round : bundle.rounds) {
+      iterations_of[round.name] += round.iterations;
+      seconds_of[round.name] += round.seconds;
+    }
+  }
+  for (const auto& [name, number] : iterations_of) {
+    summary.ba->push_back({"iterations_of." + name, number});
+    summary.seconds.push_back({"bundle_" + name, seconds_of[name]});
+  }
+  summary.seconds.push_back({"bundle_adjustment", bundle_seconds});
 }
 
 }  // namespace rotslam

@@ -21,6 +21,12 @@ void WritePositions(const std::filesystem::path& directory,
                     const PositionResult& positions,
                     const Camera& camera);
 
+/// known_rotation.txt: the keyframes' orientations and tracks, which `rotslam solve` reads.
+void WriteKnownRotationInput(const std::filesystem::path& directory,
+                             const Orientations& orientations,
+                             const PositionResult& positions,
+                             const Camera& camera);
+
 /// The parts of summary.json that `run` and `rotations` share.
 RunSummary StartSummary(const std::string& command,
                         const Input& input,
@@ -29,5 +35,11 @@ RunSummary StartSummary(const std::string& command,
 
 /// The parts that only `run` has.
 void AddPositions(const PositionResult& positions, const Camera& camera, RunSummary& summary);
+
+/// The parts that `run` and `solve` share.
+void AddKnownRotation(const KrotSolution& solution, const Camera& camera, RunSummary& summary);
+void AddBundles(const std::vector<BundleSummary>& bundles,
+                const Camera& camera,
+                RunSummary& summary);
 
 }  // namespace rotslam

@@ -2,6 +2,8 @@
 
 #include <algorithm>
 #include <chrono>
+#include <cstdint>
+#include <numeric>
 #include <utility>
 
 #include "ba/bundle_state.h"
@@ -22,49 +24,157 @@ bool AllFinite(const BundleState& state) {
   });
 }
 
-// Classifies, minimises, and tells whether the next round may go on from here.
-bool RunRound(const Camera& camera,
-              const std::string& name,
-              const BundleRound& round,
-              const BundleOptions& options,
-              BundleState& state,
-              BundleResult& result) {
-  const auto start = std::chrono::steady_clock::now();
-  ClassifyAll(camera, round.max_error_px, /*retriangulate=*/true, options, state);
-  const ResidualStatistics before = Statistics(camera, state);
-  const auto solver_start = std::chrono::steady_clock::now();
-  const std::optional<MinimisationResult> minimised = Minimise(camera, round, options, state);
-  if (!minimised) {
-    result.status = BundleStatus::kTooLittleData;
-    result.message = "round " + name + " had no moving frame with at least " +
-                     std::to_string(options.min_frame_observations) +
-                     " observations of points that fit and have depth";
-    return false;
-  }
-  if (result.summary.rounds.empty()) result.summary.before = before;
-
-  const ceres::Solver::Summary& solved = minimised->solver;
-  BundleRoundSummary summary = minimised->counts;
-  summary.name = name;
-  summary.initial_cost = solved.initial_cost;
-  summary.final_cost = solved.final_cost;
-  summary.iterations = static_cast<int>(solved.iterations.size()) - 1;
-  summary.termination = solved.message;
-  summary.solver_seconds = SecondsSince(solver_start);
-  summary.seconds = SecondsSince(start);
-  result.summary.rounds.push_back(summary);
-  if (!solved.IsSolutionUsable() || !AllFinite(state)) {
-    result.status = BundleStatus::kSolverFailed;
-    result.message = "round " + name + ": " + solved.message;
-    return false;
-  }
-  result.status = solved.termination_type == ceres::CONVERGENCE ? BundleStatus::kConverged
-                                                                : BundleStatus::kIterationLimit;
-  return true;
+// Numbers in no order, the same everywhere (splitmix64).
+std::uint64_t Scramble(std::uint64_t value) {
+  std::uint64_t z = value + 0x9E3779B97F4A7C15ull;
+  z = (z ^ (z >> 30)) * 0xBF58476D1CE4E5B9ull;
+  z = (z ^ (z >> 27)) * 0x94D049BB133111EBull;
+  return z ^ (z >> 31);
 }
+
+// The state with tracks drawn at random until every frame has `num_wanted` observations.
+BundleState WithSomeTracks(const BundleState& state, int num_wanted) {
+  std::vector<std::size_t> order(state.tracks.size());
+  std::iota(order.begin(), order.end(), std::size_t{0});
+  std::sort(order.begin(), order.end(), [](std::size_t a, std::size_t b) {
+    return Scramble(a) < Scramble(b);
+  });
+  std::vector<int> count(state.frames.size(), 0);
+  std::vector<bool> taken(state.tracks.size(), false);
+  for (const std::size_t t : order) {
+    const std::vector<Sight>& sights = state.tracks[t].sights;
+    taken[t] = std::any_of(sights.begin(), sights.end(), [&](const Sight& sight) {
+      return count[sight.frame] < num_wanted;
+    });
+    if (!taken[t]) continue;
+    for (const Sight& sight : sights) ++count[sight.frame];
+  }
+  BundleState part;
+  part.camera = state.camera;
+  part.frames = state.frames;
+  part.centers = state.centers;
+  for (std::size_t t = 0; t < state.tracks.size(); ++t) {
+    if (taken[t]) part.tracks.push_back(state.tracks[t]);
+  }
+  return part;
+}
+
+// Takes the cameras over from a part.
+void TakeCameras(const BundleState& part, BundleState& state) {
+  state.frames = part.frames;
+  state.centers = part.centers;
+  if (part.camera != state.camera) SetCamera(part.camera, state);
+}
+
+std::vector<bool> UsedFlags(const BundleState& state) {
+  std::vector<bool> flags;
+  for (const TrackState& track : state.tracks) {
+    for (const Sight& sight : track.sights) flags.push_back(sight.used);
+  }
+  return flags;
+}
+
+// The rounds of one problem, one after the other.
+class Rounds {
+ public:
+  Rounds(const Camera& calibrated, const BundleOptions& options, BundleResult& result)
+      : calibrated_(calibrated), options_(options), result_(result) {}
+
+  // Classifies and minimises, as long as nothing has gone wrong.
+  void Run(const std::string& name, const BundleRound& round, BundleState& state) {
+    if (!good_ || !round.enabled) return;
+    const auto start = std::chrono::steady_clock::now();
+    max_error_px_ = round.max_error_px;
+    ClassifyAll(round.max_error_px, /*retriangulate=*/true, options_, state);
+    const ResidualStatistics before = Statistics(state);
+    const bool is_first = result_.summary.rounds.empty();
+    Minimise(name, round, start, state);
+    if (good_ && is_first) result_.summary.before = before;
+  }
+
+  // The same, until classification changes next to nothing.
+  void Repeat(const std::string& name, const BundleRound& round, BundleState& state) {
+    Run(name, round, state);
+    for (int k = 1; k < options_.max_fine_rounds; ++k) {
+      if (!good_ || !round.enabled) return;
+      const auto start = std::chrono::steady_clock::now();
+      const std::vector<bool> before = UsedFlags(state);
+      ClassifyAll(round.max_error_px, /*retriangulate=*/true, options_, state);
+      const std::vector<bool> after = UsedFlags(state);
+      std::size_t changed = 0;
+      for (std::size_t o = 0; o < after.size(); ++o) changed += before[o] != after[o] ? 1 : 0;
+      const auto total = static_cast<double>(std::count(after.begin(), after.end(), true));
+      if (static_cast<double>(changed) <= options_.max_changed_share * total) return;
+      Minimise(name, round, start, state);
+    }
+  }
+
+  // Lets the lens move on the observations of the round before; keeps that when it gains enough.
+  void TryLens(const BundleRound& round, BundleState& state) {
+    const LensOptions& lens = options_.lens;
+    if (!good_ || !round.enabled) return;
+    if (!lens.refine_focal && !lens.refine_distortion) return;
+    const BundleState before = state;
+    refine_lens_ = true;
+    Minimise("lens", round, std::chrono::steady_clock::now(), state);
+    if (!good_) return;
+    const BundleRoundSummary& summary = result_.summary.rounds.back();
+    result_.summary.lens_gain = 1.0 - summary.final_cost / summary.initial_cost;
+    refine_lens_ = result_.summary.lens_gain >= lens.min_gain;
+    result_.summary.lens_refined = refine_lens_;
+    if (!refine_lens_) state = before;
+  }
+
+  bool good() const { return good_; }
+  double max_error_px() const { return max_error_px_; }  // of the last round
+
+ private:
+  void Minimise(const std::string& name,
+                const BundleRound& round,
+                std::chrono::steady_clock::time_point start,
+                BundleState& state) {
+    const auto solver_start = std::chrono::steady_clock::now();
+    const std::optional<MinimisationResult> minimised =
+        rotslam::Minimise(calibrated_, round, refine_lens_, options_, state);
+    good_ = minimised.has_value();
+    if (!minimised) {
+      result_.status = BundleStatus::kTooLittleData;
+      result_.message = "round " + name + " had no moving frame with at least " +
+                        std::to_string(options_.min_frame_observations) +
+                        " observations of points that fit and have depth";
+      return;
+    }
+    const ceres::Solver::Summary& solved = minimised->solver;
+    BundleRoundSummary summary = minimised->counts;
+    summary.name = name;
+    summary.initial_cost = solved.initial_cost;
+    summary.final_cost = solved.final_cost;
+    summary.iterations = static_cast<int>(solved.iterations.size()) - 1;
+    summary.termination = solved.message;
+    summary.solver_seconds = SecondsSince(solver_start);
+    summary.seconds = SecondsSince(start);
+    result_.summary.rounds.push_back(summary);
+    good_ = solved.IsSolutionUsable() && AllFinite(state);
+    if (!good_) {
+      result_.status = BundleStatus::kSolverFailed;
+      result_.message = "round " + name + ": " + solved.message;
+      return;
+    }
+    result_.status = solved.termination_type == ceres::CONVERGENCE ? BundleStatus::kConverged
+                                                                   : BundleStatus::kIterationLimit;
+  }
+
+  const Camera& calibrated_;
+  const BundleOptions& options_;
+  BundleResult& result_;
+  bool good_ = true;
+  bool refine_lens_ = false;
+  double max_error_px_ = 0.0;
+};
 
 // Poses and well-fitting tracks of `state`.
 void TakeResult(const BundleProblem& problem, const BundleState& state, BundleResult& result) {
+  result.camera = state.camera;
   Reconstruction& out = result.reconstruction;
   out.cam_from_world = problem.start.cam_from_world;
   std::vector<bool> center_seen(state.centers.size(), false);
@@ -75,6 +185,7 @@ void TakeResult(const BundleProblem& problem, const BundleState& state, BundleRe
     for (const Sight& sight : entry.sights) {
       if (!sight.used) continue;
       track.observations.push_back(*sight.observation);
+      track.observations.back().bearing = sight.bearing;
       center_seen[state.frames[sight.frame].center] = true;
     }
     result.summary.num_observations += static_cast<int>(track.observations.size());
@@ -121,29 +232,35 @@ BundleResult RefineBundle(const BundleProblem& problem, const BundleOptions& opt
   const auto start = std::chrono::steady_clock::now();
   BundleState state = MakeBundleState(problem, options);
   BundleResult result;
-  double max_error_px = 0.0;
-  bool good = true;
-  const auto run = [&](const std::string& name, const BundleRound& round) {
-    if (!good || !round.enabled) return;
-    max_error_px = round.max_error_px;
-    good = RunRound(problem.camera, name, round, options, state, result);
-  };
-  run("bridge", options.bridge);
-  run("coarse", options.coarse);
-  run("fine", options.fine);
+  Rounds rounds(problem.camera, options, result);
+  const bool in_part = options.preparing_observations > 0 && options.fine.enabled;
+  std::optional<BundleState> part;
+  if (in_part) part = WithSomeTracks(state, options.preparing_observations);
+  BundleState& preparing = part ? *part : state;
+  rounds.Run("bridge", options.bridge, preparing);
+  rounds.Run("coarse", options.coarse, preparing);
+  rounds.TryLens(options.coarse, preparing);
+  if (part) TakeCameras(*part, state);
+  rounds.Repeat("fine", options.fine, state);
 
   BundleSummary& summary = result.summary;
   for (const BundleRoundSummary& round : summary.rounds) summary.iterations += round.iterations;
   if (!summary.rounds.empty()) {
-    summary.initial_cost = summary.rounds.front().initial_cost;
+    const auto whole = std::find_if(
+        summary.rounds.begin(), summary.rounds.end(), [](const BundleRoundSummary& round) {
+          return round.name == "fine";
+        });
+    const auto first = whole == summary.rounds.end() ? summary.rounds.begin() : whole;
+    summary.initial_cost = first->initial_cost;
     summary.final_cost = summary.rounds.back().final_cost;
   }
-  if (good) {
-    ClassifyAll(problem.camera, max_error_px, /*retriangulate=*/false, options, state);
-    summary.after = Statistics(problem.camera, state);
+  if (rounds.good()) {
+    ClassifyAll(rounds.max_error_px(), /*retriangulate=*/false, options, state);
+    summary.after = Statistics(state);
     TakeResult(problem, state, result);
     result.message = summary.rounds.back().termination;
   } else {
+    result.camera = problem.camera;
     result.reconstruction = problem.start;
   }
   summary.seconds = SecondsSince(start);
@@ -152,7 +269,7 @@ BundleResult RefineBundle(const BundleProblem& problem, const BundleOptions& opt
 
 Reconstruction TriangulateTracks(const BundleProblem& problem, const BundleOptions& options) {
   BundleState state = MakeBundleState(problem, options);
-  ClassifyAll(problem.camera, options.fine.max_error_px, /*retriangulate=*/true, options, state);
+  ClassifyAll(options.fine.max_error_px, /*retriangulate=*/true, options, state);
   BundleResult result;
   TakeResult(problem, state, result);
   result.reconstruction.center_in_world = problem.start.center_in_world;

@@ -62,7 +62,7 @@ struct BundleRoundSummary {
 };
 
 struct BundleSummary {
-  double initial_cost = 0.0;  // of the first round
+  double initial_cost = 0.0;  // of the first round that takes all tracks
   double final_cost = 0.0;    // of the last
   int iterations = 0;         // of all rounds
   ResidualStatistics before;  // observations of the first round, before its solve
@@ -72,6 +72,8 @@ struct BundleSummary {
   int num_observations = 0;
   int num_dropped_tracks = 0;        // of the tracks given
   int num_dropped_observations = 0;  // of the observations given, dropped tracks' included
+  double lens_gain = 0.0;     // share of the cost that another lens took off, see LensOptions
+  bool lens_refined = false;  // whether that was enough
   double seconds = 0.0;
   std::vector<BundleRoundSummary> rounds;
 };
@@ -83,6 +85,8 @@ struct BundleResult {
   /// point. A frame whose place no observation tells keeps its rotation but has no centre, so it
   /// has no pose: resect or interpolate it. The start, unchanged, when not usable.
   Reconstruction reconstruction;
+  /// The camera with its lens refined; the bearings in `reconstruction` are its.
+  Camera camera;
   /// Frames with a pose at the start but too few good observations to refine it; those that share
   /// the centre of a refined frame still have a pose.
   std::vector<FrameId> weak_frames;

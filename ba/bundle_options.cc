@@ -16,12 +16,29 @@ std::optional<std::string> BundleRound::Problem() const {
   return std::nullopt;
 }
 
+std::optional<std::string> LensOptions::Problem() const {
+  if (!(focal_sigma > 0.0)) return OutOfRange("focal_sigma", focal_sigma, "positive");
+  if (!(distortion_sigma > 0.0)) {
+    return OutOfRange("distortion_sigma", distortion_sigma, "positive");
+  }
+  if (!(min_gain >= 0.0)) return OutOfRange("min_gain", min_gain, "at least 0");
+  return std::nullopt;
+}
+
 std::optional<std::string> BundleOptions::Problem() const {
   if (auto problem = ProblemIn("bridge", bridge)) return problem;
   if (auto problem = ProblemIn("coarse", coarse)) return problem;
   if (auto problem = ProblemIn("fine", fine)) return problem;
+  if (auto problem = ProblemIn("lens", lens)) return problem;
   if (!bridge.enabled && !coarse.enabled && !fine.enabled) {
     return "fine.enabled is false, must be true for one of bridge, coarse and fine";
+  }
+  if (preparing_observations < 0) {
+    return OutOfRange("preparing_observations", preparing_observations, "at least 0");
+  }
+  if (max_fine_rounds < 1) return OutOfRange("max_fine_rounds", max_fine_rounds, "at least 1");
+  if (!(max_changed_share >= 0.0)) {
+    return OutOfRange("max_changed_share", max_changed_share, "at least 0");
   }
   if (min_observations < 2) {
     return OutOfRange("min_observations", min_observations, "at least 2");

@@ -82,6 +82,7 @@ FrameId CenterOwner(const std::map<FrameId, FrameId>& shared_center, FrameId fra
 BundleState MakeBundleState(const BundleProblem& problem, const BundleOptions& options) {
   CheckContract(problem, options);
   BundleState state;
+  state.camera = problem.camera;
   const Reconstruction& start = problem.start;
   std::map<FrameId, int> frame_index;
   std::map<FrameId, int> center_index;
@@ -105,7 +106,7 @@ BundleState MakeBundleState(const BundleProblem& problem, const BundleOptions& o
     for (const Observation& observation : track.observations) {
       const auto frame = frame_index.find(observation.frame);
       if (frame == frame_index.end()) continue;
-      entry.sights.push_back({&observation, frame->second, false});
+      entry.sights.push_back({&observation, observation.bearing, frame->second, false});
       places.insert(state.frames[frame->second].center);
     }
     entry.one_place = places.size() <= 1;
@@ -117,6 +118,16 @@ BundleState MakeBundleState(const BundleProblem& problem, const BundleOptions& o
     state.tracks.push_back(std::move(entry));
   }
   return state;
+}
+
+void SetCamera(const Camera& camera, BundleState& state) {
+  state.camera = camera;
+  for (TrackState& track : state.tracks) {
+    for (Sight& sight : track.sights) {
+      const auto bearing = camera.Unproject(sight.observation->keypoint_px);
+      if (bearing) sight.bearing = *bearing;
+    }
+  }
 }
 
 }  // namespace rotslam

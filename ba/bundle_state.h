@@ -26,6 +26,7 @@ enum class TrackKind { kOut, kPoint, kDirection };
 // An observation in a frame that has a pose.
 struct Sight {
   const Observation* observation = nullptr;
+  Eigen::Vector3d bearing;  // of the keypoint, as the lens stands
   int frame = 0;
   bool used = false;
 };
@@ -40,6 +41,7 @@ struct TrackState {
 };
 
 struct BundleState {
+  Camera camera;
   std::vector<FrameState> frames;
   std::vector<Eigen::Vector3d> centers;
   std::vector<TrackState> tracks;
@@ -49,5 +51,8 @@ struct BundleState {
 /// problem's: it must outlive the state.
 /// Throws std::invalid_argument where the contract of RefineBundle is broken.
 BundleState MakeBundleState(const BundleProblem& problem, const BundleOptions& options);
+
+/// Replaces the camera, and the bearings with it.
+void SetCamera(const Camera& camera, BundleState& state);
 
 }  // namespace rotslam

@@ -20,13 +20,12 @@ Sighting AsSighting(const BundleState& state, const Sight& sight, double focal_p
   const FrameState& frame = state.frames[sight.frame];
   return {frame.cam_from_world,
           state.centers[frame.center],
-          sight.observation->bearing,
+          sight.bearing,
           sight.observation->sigma_px / focal_px};
 }
 
 // Reprojection error in pixels; infinite where the camera cannot see the position.
-double ErrorPx(const Camera& camera,
-               const BundleState& state,
+double ErrorPx(const BundleState& state,
                const TrackState& track,
                const Sight& sight,
                const Eigen::Vector3d& position) {
@@ -34,7 +33,7 @@ double ErrorPx(const Camera& camera,
   const Eigen::Vector3d in_cam =
       frame.cam_from_world *
       (track.one_place ? position : Eigen::Vector3d(position - state.centers[frame.center]));
-  const std::optional<Eigen::Vector2d> pixel = camera.Project(in_cam);
+  const std::optional<Eigen::Vector2d> pixel = state.camera.Project(in_cam);
   return pixel ? (*pixel - sight.observation->keypoint_px).norm() : kInfinity;
 }
 
@@ -48,12 +47,8 @@ struct Verdict {
 class Classifier {
  public:
   // @param max_error_px  zero: whatever projects fits.
-  Classifier(const Camera& camera,
-             const BundleState& state,
-             double max_error_px,
-             const BundleOptions& options)
-      : camera_(camera),
-        state_(state),
+  Classifier(const BundleState& state, double max_error_px, const BundleOptions& options)
+      : state_(state),
         max_error_px_(max_error_px),
         min_observations_(options.min_observations),
         min_angle_rad_(options.min_angle_deg * kRadFromDeg) {}
@@ -121,7 +116,7 @@ class Classifier {
     Verdict verdict;
     verdict.score = 0.0;
     for (const Sight& sight : track.sights) {
-      const double error_px = ErrorPx(camera_, state_, track, sight, position);
+      const double error_px = ErrorPx(state_, track, sight, position);
       const double limit_px = LimitPx(sight);
       verdict.fits.push_back(error_px <= limit_px);
       verdict.num_fits += verdict.fits.back() ? 1 : 0;
@@ -138,8 +133,8 @@ class Classifier {
       for (std::size_t k = 0; k < chosen.size(); ++k) {
         if (!chosen[k]) continue;
         const Observation& observation = *track.sights[k].observation;
-        sum += state_.frames[track.sights[k].frame].cam_from_world.Inverse() * observation.bearing /
-               (observation.sigma_px * observation.sigma_px);
+        sum += state_.frames[track.sights[k].frame].cam_from_world.Inverse() *
+               track.sights[k].bearing / (observation.sigma_px * observation.sigma_px);
       }
       if (!(sum.norm() > 0.0)) return std::nullopt;
       return sum.normalized();
@@ -147,7 +142,7 @@ class Classifier {
     std::vector<Sighting> sightings;
     for (std::size_t k = 0; k < chosen.size(); ++k) {
       if (chosen[k]) {
-        sightings.push_back(AsSighting(state_, track.sights[k], camera_.MeanFocal()));
+        sightings.push_back(AsSighting(state_, track.sights[k], state_.camera.MeanFocal()));
       }
     }
     if (sightings.size() < 2) return std::nullopt;
@@ -184,7 +179,6 @@ class Classifier {
     return false;
   }
 
-  const Camera& camera_;
   const BundleState& state_;
   double max_error_px_;
   int min_observations_;
@@ -218,12 +212,11 @@ void RemoveWeakFrames(const Classifier& classifier, int min_observations, Bundle
 
 }  // namespace
 
-void ClassifyAll(const Camera& camera,
-                 double max_error_px,
+void ClassifyAll(double max_error_px,
                  bool retriangulate,
                  const BundleOptions& options,
                  BundleState& state) {
-  const Classifier classifier(camera, state, max_error_px, options);
+  const Classifier classifier(state, max_error_px, options);
   if (retriangulate) {
     for (FrameState& frame : state.frames) frame.weak = false;
   }
@@ -234,13 +227,13 @@ void ClassifyAll(const Camera& camera,
   RemoveWeakFrames(classifier, options.min_frame_observations, state);
 }
 
-ResidualStatistics Statistics(const Camera& camera, const BundleState& state) {
+ResidualStatistics Statistics(const BundleState& state) {
   std::vector<double> errors_px;
   for (const TrackState& track : state.tracks) {
     if (track.kind != TrackKind::kPoint) continue;
     for (const Sight& sight : track.sights) {
       if (!sight.used) continue;
-      errors_px.push_back(ErrorPx(camera, state, track, sight, track.position));
+      errors_px.push_back(ErrorPx(state, track, sight, track.position));
     }
   }
   ResidualStatistics statistics;

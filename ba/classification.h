@@ -8,13 +8,12 @@ namespace rotslam {
 /// point or a direction; frames left with too few observations become weak.
 /// @param max_error_px   largest reprojection error of what fits; zero: whatever projects fits.
 /// @param retriangulate  look for each track's position anew; else it is judged where it is.
-void ClassifyAll(const Camera& camera,
-                 double max_error_px,
+void ClassifyAll(double max_error_px,
                  bool retriangulate,
                  const BundleOptions& options,
                  BundleState& state);
 
 /// Reprojection errors of the used observations of points.
-ResidualStatistics Statistics(const Camera& camera, const BundleState& state);
+ResidualStatistics Statistics(const BundleState& state);
 
 }  // namespace rotslam

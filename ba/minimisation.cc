@@ -17,6 +17,8 @@ namespace {
 // Weight of the scale anchor: a share of 1e-4 of the scale costs as much as one sigma. The optimum
 // does not depend on it.
 constexpr double kScaleAnchorWeight = 1e4;
+// Of a part of the lens that does not move.
+constexpr double kHeldSigma = 1e-7;
 // Keeps Levenberg-Marquardt's damping above rounding, for what the data leave open: the length of
 // directions, scale and place of parts that share no track.
 constexpr double kMaxTrustRegionRadius = 1e10;
@@ -30,15 +32,18 @@ std::unique_ptr<ceres::LossFunction> MakeLoss(const BundleRound& round) {
 // The used observations as a Ceres problem over the state's own numbers.
 class Minimisation {
  public:
-  Minimisation(const Camera& camera,
-               bool refine_rotations,
+  Minimisation(const Camera& calibrated,
                const BundleRound& round,
+               bool refine_lens,
+               const BundleOptions& options,
                BundleState& state)
-      : camera_(camera),
-        refine_rotations_(refine_rotations),
+      : calibrated_(calibrated),
+        refine_rotations_(round.refine_rotations && options.refine_rotations),
+        refine_lens_(refine_lens),
         state_(state),
         loss_(MakeLoss(round)),
         problem_(ProblemOptions()),
+        lens_(LensOf(state.camera, calibrated)),
         camera_blocks_(3 * state.centers.size() + 4 * state.frames.size()),
         frame_used_(state.frames.size(), false),
         center_used_(state.centers.size(), false) {
@@ -51,17 +56,20 @@ class Minimisation {
     }
     ordering_ = std::make_shared<ceres::ParameterBlockOrdering>();
     AddResiduals();
-    if (!Empty()) FixGauge();
+    if (Empty()) return;
+    FixGauge();
+    if (refine_lens_) FreeLens(options.lens);
   }
 
   bool Empty() const { return counts_.num_points == 0 || !moving_; }
   // Counts only; costs and times come from Solve.
   const BundleRoundSummary& Counts() const { return counts_; }
 
-  ceres::Solver::Summary Solve(const BundleRound& round, int max_dense_frames) {
+  ceres::Solver::Summary Solve(const BundleRound& round, const BundleOptions& bundle_options) {
     ceres::Solver::Options options;
-    options.linear_solver_type =
-        counts_.num_frames <= max_dense_frames ? ceres::DENSE_SCHUR : ceres::SPARSE_SCHUR;
+    options.linear_solver_type = counts_.num_frames <= bundle_options.max_dense_frames
+                                     ? ceres::DENSE_SCHUR
+                                     : ceres::SPARSE_SCHUR;
     options.sparse_linear_algebra_library_type = ceres::SUITE_SPARSE;
     options.linear_solver_ordering = ordering_;
     options.num_threads = 1;
@@ -69,11 +77,13 @@ class Minimisation {
     options.function_tolerance = round.function_tolerance;
     options.gradient_tolerance = 0.0;
     options.parameter_tolerance = 1e-12;
+    options.initial_trust_region_radius = round.initial_radius;
     options.max_trust_region_radius = kMaxTrustRegionRadius;
     options.logging_type = ceres::SILENT;
     ceres::Solver::Summary summary;
     ceres::Solve(options, &problem_, &summary);
     TakeCameras();
+    TakeLens(bundle_options.lens);
     return summary;
   }
 
@@ -122,15 +132,55 @@ class Minimisation {
     if (!frame.fixed) moving_ = true;
     ++counts_.num_observations;
     if (track.kind == TrackKind::kDirection) {
-      directions_.emplace_back(camera_, observation.keypoint_px, observation.sigma_px);
-      problem_.AddResidualBlock(
-          &directions_.back(), loss_.get(), quaternion, track.position.data());
+      AddDirection(observation, quaternion, track.position.data());
       return;
     }
     center_used_[frame.center] = true;
-    points_.emplace_back(camera_, observation.keypoint_px, observation.sigma_px);
-    problem_.AddResidualBlock(
-        &points_.back(), loss_.get(), quaternion, CenterBlock(frame.center), track.position.data());
+    AddPoint(observation, quaternion, CenterBlock(frame.center), track.position.data());
+  }
+
+  void AddDirection(const Observation& observation, double* quaternion, double* direction) {
+    if (refine_lens_) {
+      lens_directions_.emplace_back(calibrated_, observation.keypoint_px, observation.sigma_px);
+      problem_.AddResidualBlock(
+          &lens_directions_.back(), loss_.get(), quaternion, direction, lens_.data());
+      return;
+    }
+    directions_.emplace_back(state_.camera, observation.keypoint_px, observation.sigma_px);
+    problem_.AddResidualBlock(&directions_.back(), loss_.get(), quaternion, direction);
+  }
+
+  void AddPoint(const Observation& observation, double* quaternion, double* center, double* point) {
+    if (refine_lens_) {
+      lens_points_.emplace_back(calibrated_, observation.keypoint_px, observation.sigma_px);
+      problem_.AddResidualBlock(
+          &lens_points_.back(), loss_.get(), quaternion, center, point, lens_.data());
+      return;
+    }
+    points_.emplace_back(state_.camera, observation.keypoint_px, observation.sigma_px);
+    problem_.AddResidualBlock(&points_.back(), loss_.get(), quaternion, center, point);
+  }
+
+  // What is held is held by a tight prior: a block of another size would leave Ceres' specialised
+  // elimination.
+  void FreeLens(const LensOptions& options) {
+    const double distortion_sigma =
+        options.refine_distortion ? options.distortion_sigma : kHeldSigma;
+    lens_prior_ = std::make_unique<LensPriorCost>(
+        LensOf(calibrated_, calibrated_),
+        LensParameters(options.refine_focal ? options.focal_sigma : kHeldSigma,
+                       distortion_sigma,
+                       distortion_sigma));
+    problem_.AddResidualBlock(lens_prior_.get(), nullptr, lens_.data());
+    ordering_->AddElementToGroup(lens_.data(), 1);
+  }
+
+  void TakeLens(const LensOptions& options) {
+    if (!refine_lens_ || !lens_.allFinite()) return;
+    const LensParameters given = LensOf(calibrated_, calibrated_);
+    if (!options.refine_focal) lens_[0] = given[0];
+    if (!options.refine_distortion) lens_.tail<2>() = given.tail<2>();
+    SetCamera(WithLens(calibrated_, lens_), state_);
   }
 
   // Holds fixed frames, or else the first frame that sees points, and the scale where no two held
@@ -189,15 +239,20 @@ class Minimisation {
     }
   }
 
-  const Camera& camera_;
+  const Camera& calibrated_;
   const bool refine_rotations_;
+  const bool refine_lens_;
   BundleState& state_;
   std::unique_ptr<ceres::LossFunction> loss_;
   LeftRotationManifold manifold_;
   std::deque<ReprojectionCost> points_;
   std::deque<DirectionCost> directions_;
+  std::deque<LensReprojectionCost> lens_points_;
+  std::deque<LensDirectionCost> lens_directions_;
+  std::unique_ptr<LensPriorCost> lens_prior_;
   std::unique_ptr<ScaleAnchorCost> anchor_;
   ceres::Problem problem_;
+  LensParameters lens_;
   // Centres, then quaternions, in one piece of memory: Ceres sorts the blocks of a group by
   // address, and with it the order of elimination, which must not depend on where an allocation
   // lands.
@@ -211,16 +266,16 @@ class Minimisation {
 
 }  // namespace
 
-std::optional<MinimisationResult> Minimise(const Camera& camera,
+std::optional<MinimisationResult> Minimise(const Camera& calibrated,
                                            const BundleRound& round,
+                                           bool refine_lens,
                                            const BundleOptions& options,
                                            BundleState& state) {
-  Minimisation minimisation(
-      camera, round.refine_rotations && options.refine_rotations, round, state);
+  Minimisation minimisation(calibrated, round, refine_lens, options, state);
   if (minimisation.Empty()) return std::nullopt;
   MinimisationResult result;
   result.counts = minimisation.Counts();
-  result.solver = minimisation.Solve(round, options.max_dense_frames);
+  result.solver = minimisation.Solve(round, options);
   return result;
 }
 

@@ -13,11 +13,14 @@ struct MinimisationResult {
   ceres::Solver::Summary solver;
 };
 
-/// Moves poses, points and directions of `state` to a minimum of the used observations' robust
-/// cost.
+/// Moves poses, points, directions and, where asked, the lens of `state` to a minimum of the used
+/// observations' robust cost.
+/// @param calibrated   the camera as it was given: what the lens is held to.
+/// @param refine_lens  as far as `options.lens` lets it.
 /// @return  nullopt, and the state as it was, when no frame that may move sees a point.
-std::optional<MinimisationResult> Minimise(const Camera& camera,
+std::optional<MinimisationResult> Minimise(const Camera& calibrated,
                                            const BundleRound& round,
+                                           bool refine_lens,
                                            const BundleOptions& options,
                                            BundleState& state);
 

@@ -13,7 +13,17 @@ struct ReprojectionJacobian {
   Eigen::Matrix<double, 2, 3> by_rotation;  // px per rad of delta, Exp(delta) * cam_from_world
   Eigen::Matrix<double, 2, 3> by_center;    // px per world unit
   Eigen::Matrix<double, 2, 3> by_point;     // px per world unit
+  Eigen::Matrix<double, 2, 3> by_lens;      // px per unit of LensParameters
 };
+
+/// What refinement can change about a camera, as one parameter block: its focal length as a share
+/// of the one given, and the first two radial coefficients of its distortion.
+using LensParameters = Eigen::Vector3d;
+
+LensParameters LensOf(const Camera& camera, const Camera& calibrated);
+
+/// `camera` with that lens; a pinhole that gets a distortion becomes radtan.
+Camera WithLens(const Camera& camera, const LensParameters& lens);
 
 /// Pixel at which a camera sees a point; nullopt where the camera model does not reach.
 /// @param R_c_w  cam_from_world as a matrix.
@@ -76,6 +86,52 @@ class DirectionCost final : public ceres::SizedCostFunction<2, 4, 3> {
   const Camera& camera_;
   Eigen::Vector2d keypoint_px_;
   double sigma_px_;
+};
+
+/// The same two with a lens that moves too: LensParameters (3) come last among the parameters.
+class LensReprojectionCost final : public ceres::SizedCostFunction<2, 4, 3, 3, 3> {
+ public:
+  /// `camera`, whose lens is replaced, must outlive the cost function.
+  LensReprojectionCost(const Camera& camera, const Eigen::Vector2d& keypoint_px, double sigma_px)
+      : camera_(camera), keypoint_px_(keypoint_px), sigma_px_(sigma_px) {}
+  bool Evaluate(double const* const* parameters,
+                double* residuals,
+                double** jacobians) const override;
+
+ private:
+  const Camera& camera_;
+  Eigen::Vector2d keypoint_px_;
+  double sigma_px_;
+};
+
+class LensDirectionCost final : public ceres::SizedCostFunction<2, 4, 3, 3> {
+ public:
+  /// `camera`, whose lens is replaced, must outlive the cost function.
+  LensDirectionCost(const Camera& camera, const Eigen::Vector2d& keypoint_px, double sigma_px)
+      : camera_(camera), keypoint_px_(keypoint_px), sigma_px_(sigma_px) {}
+  bool Evaluate(double const* const* parameters,
+                double* residuals,
+                double** jacobians) const override;
+
+ private:
+  const Camera& camera_;
+  Eigen::Vector2d keypoint_px_;
+  double sigma_px_;
+};
+
+/// (lens - expected) / sigma: what the calibration says.
+class LensPriorCost final : public ceres::SizedCostFunction<3, 3> {
+ public:
+  /// @param sigmas  positive.
+  LensPriorCost(const LensParameters& expected, const LensParameters& sigmas)
+      : expected_(expected), sigmas_(sigmas) {}
+  bool Evaluate(double const* const* parameters,
+                double* residuals,
+                double** jacobians) const override;
+
+ private:
+  LensParameters expected_;
+  LensParameters sigmas_;
 };
 
 /// weight * (direction . (center - origin) / length - 1): keeps one coordinate of one centre, and

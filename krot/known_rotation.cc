@@ -40,6 +40,48 @@ Units InUnits(const KrotOptions& options, const Camera& camera) {
           options.loose_factor * options.threshold_px / focal_px};
 }
 
+// The linear programs have one bound for all: that of the median track.
+double MedianOf(std::vector<double> values, double if_none) {
+  if (values.empty()) return if_none;
+  const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
+  std::nth_element(values.begin(), middle, values.end());
+  return *middle;
+}
+
+Units WithThreshold(Units units, double gamma, const KrotOptions& options) {
+  units.gamma = gamma;
+  units.loose_rad = options.loose_factor * gamma;
+  return units;
+}
+
+// Largest image error of a right observation, normalised, by track position: threshold_px, or more
+// where the orientations ask for it.
+std::vector<double> TrackThresholds(const std::vector<Track>& tracks,
+                                    const std::map<FrameId, double>& sigma_rad,
+                                    const KrotOptions& options,
+                                    const Units& units) {
+  std::vector<double> thresholds;
+  thresholds.reserve(tracks.size());
+  for (const Track& track : tracks) {
+    double least = kInfinity;
+    double most = 0.0;
+    double keypoint = 0.0;
+    for (const Observation& observation : track.observations) {
+      keypoint = std::max(keypoint, observation.sigma_px / units.focal_px);
+      const auto sigma = sigma_rad.find(observation.frame);
+      if (sigma == sigma_rad.end()) continue;
+      least = std::min(least, sigma->second * sigma->second);
+      most = std::max(most, sigma->second * sigma->second);
+    }
+    const double turn = std::max(0.0, most - least);
+    // Keypoints alone are in threshold_px already, whatever their sigma is called.
+    const double grown =
+        turn > 0.0 ? options.threshold_sigmas * std::sqrt(keypoint * keypoint + turn) : 0.0;
+    thresholds.push_back(std::max(units.gamma, grown));
+  }
+  return thresholds;
+}
+
 void RequireContract(const RotationMap& cam_from_world,
                      const std::vector<Track>& tracks,
                      const Camera& camera,
@@ -220,6 +262,11 @@ ComponentStart SolvePrograms(const RotationMap& cam_from_world,
       solution.gamma_high == kInfinity ? high : std::max(solution.gamma_high, high);
   solution.num_bracket_observations += static_cast<int>(survivors.observations.size());
   solution.num_bracket_tracks += survivors.num_points;
+  if (options.start == "linear") {
+    auto linear = SolveLinearStart(survivors, options.linear_start);
+    if (!linear) return result;
+    structure = *std::move(linear);
+  }
   for (int view = 0; view < named.problem.num_views(); ++view) {
     result.centers[named.views[view]] = structure.center_in_world[view];
   }
@@ -236,6 +283,7 @@ struct TrackPoint {
 std::vector<std::optional<TrackPoint>> TriangulateAll(const RotationMap& cam_from_world,
                                                       const CenterMap& centers,
                                                       const std::vector<Track>& tracks,
+                                                      const std::vector<double>& thresholds,
                                                       const KrotOptions& options,
                                                       const Units& units) {
   std::vector<std::optional<TrackPoint>> points(tracks.size());
@@ -243,7 +291,8 @@ std::vector<std::optional<TrackPoint>> TriangulateAll(const RotationMap& cam_fro
     std::vector<int> observations;
     const std::vector<Sighting> sightings =
         PlacedSightings(cam_from_world, centers, tracks[t], units.focal_px, &observations);
-    const auto robust = TriangulateRobustly(sightings, units.point_angle_rad, units.loose_rad);
+    const auto robust =
+        TriangulateRobustly(sightings, units.point_angle_rad, options.loose_factor * thresholds[t]);
     if (!robust) return;
     TrackPoint point{robust->point_in_world, {}};
     std::size_t next = 0;
@@ -290,6 +339,7 @@ void Normalise(CenterMap& centers,
 // bracket converged; nullopt when its programs failed.
 std::optional<bool> SolveComponent(const RotationMap& cam_from_world,
                                    const std::vector<Track>& tracks,
+                                   const std::vector<double>& thresholds,
                                    const ViewComponent& component,
                                    const KrotOptions& options,
                                    const Units& units,
@@ -320,7 +370,7 @@ std::optional<bool> SolveComponent(const RotationMap& cam_from_world,
   }
   solution.num_grown_views += static_cast<int>(start.centers.size() - before);
 
-  auto points = TriangulateAll(cam_from_world, start.centers, tracks, options, units);
+  auto points = TriangulateAll(cam_from_world, start.centers, tracks, thresholds, options, units);
   Normalise(start.centers, tracks, points);
   const int number =
       solution.component.empty()
@@ -371,10 +421,13 @@ void Describe(int num_views, int num_failed, const Units& units, KrotSolution& s
 
 void Solve(const RotationMap& cam_from_world,
            const std::vector<Track>& input,
+           const std::map<FrameId, double>& sigma_rad,
            const KrotOptions& options,
-           const Units& units,
+           Units units,
            KrotSolution& solution) {
   std::vector<Track> tracks = CleanTracks(input, solution);
+  const std::vector<double> thresholds = TrackThresholds(tracks, sigma_rad, options, units);
+  units = WithThreshold(units, MedianOf(thresholds, units.gamma), options);
   std::set<FrameId> views;
   int num_usable = 0;
   int num_moving = 0;
@@ -410,7 +463,7 @@ void Solve(const RotationMap& cam_from_world,
   bool all_converged = true;
   for (const ViewComponent& component : components) {
     const auto converged =
-        SolveComponent(cam_from_world, tracks, component, options, units, solution);
+        SolveComponent(cam_from_world, tracks, thresholds, component, options, units, solution);
     if (!converged) ++num_failed;
     all_converged = all_converged && converged.value_or(false);
   }
@@ -426,13 +479,16 @@ void Solve(const RotationMap& cam_from_world,
 }  // namespace
 
 std::optional<std::string> KrotOptions::Problem() const {
-  if (start != "l1" && start != "bisection") {
-    return "start is '" + start + "', must be l1 or bisection";
+  if (start != "l1" && start != "bisection" && start != "linear") {
+    return "start is '" + start + "', must be l1, bisection or linear";
   }
   if (start == "bisection" && !use_bracket) {
     return "start is 'bisection', which needs use_bracket";
   }
   if (!(threshold_px > 0.0)) return OutOfRange("threshold_px", threshold_px, "above 0");
+  if (!(threshold_sigmas >= 0.0)) {
+    return OutOfRange("threshold_sigmas", threshold_sigmas, "at least 0");
+  }
   if (!(loose_factor >= 1.0)) return OutOfRange("loose_factor", loose_factor, "at least 1");
   if (max_lp_views < 2) return OutOfRange("max_lp_views", max_lp_views, "at least 2");
   if (max_bracket_views < 0)
@@ -457,6 +513,7 @@ std::optional<std::string> KrotOptions::Problem() const {
   }
   if (num_threads < 1) return OutOfRange("num_threads", num_threads, "at least 1");
   if (const auto trouble = robust_start.Problem()) return "robust_start." + *trouble;
+  if (const auto trouble = linear_start.Problem()) return "linear_start." + *trouble;
   if (const auto trouble = bisection.Problem()) return "bisection." + *trouble;
   return std::nullopt;
 }
@@ -464,11 +521,12 @@ std::optional<std::string> KrotOptions::Problem() const {
 KrotSolution SolveKnownRotation(const RotationMap& cam_from_world,
                                 const std::vector<Track>& tracks,
                                 const Camera& camera,
-                                const KrotOptions& options) {
+                                const KrotOptions& options,
+                                const std::map<FrameId, double>& sigma_rad) {
   const auto begin = std::chrono::steady_clock::now();
   RequireContract(cam_from_world, tracks, camera, options);
   KrotSolution solution;
-  Solve(cam_from_world, tracks, options, InUnits(options, camera), solution);
+  Solve(cam_from_world, tracks, sigma_rad, options, InUnits(options, camera), solution);
   std::sort(solution.removed.begin(),
             solution.removed.end(),
             [](const RemovedObservation& a, const RemovedObservation& b) {

@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "krot/bisection.h"
+#include "krot/linear_start.h"
 #include "krot/lp.h"
 #include "krot/robust_start.h"
 #include "rotodom/camera/camera.h"
@@ -17,12 +18,17 @@ namespace rotslam {
 
 struct KrotOptions {
   // Which answer gives the positions: "l1", the least sum of misses, forgives outliers and is the
-  // better start for bundle adjustment; "bisection", the least largest residual of what l1 kept.
+  // better start for bundle adjustment; "bisection", the least largest residual of what l1 kept;
+  // "linear", equations between the centres (SolveLinearStart) on the same. All lead bundle
+  // adjustment to one minimum.
   // The bracket is found either way (see use_bracket).
   std::string start = "l1";
   // Image bound of the L1 start: observations within it cost nothing. It must cover feature noise
   // and rotation error together: 0.3 deg moves a point by 3.7 px at f = 700.
   double threshold_px = 4.0;
+  // Where orientations are less certain than that, the bound is this many standard deviations of a
+  // track's keypoints and of its views' orientations together.
+  double threshold_sigmas = 3.0;
   // Observations of triangulated points are kept up to this many thresholds. The positions are a
   // start, good to a few metres over 150: a tight test here throws good observations away.
   double loose_factor = 2.0;
@@ -50,6 +56,7 @@ struct KrotOptions {
   // out of the linear programs (they are triangulated all the same).
   double max_off_axis_deg = 80.0;
   RobustStartOptions robust_start;
+  LinearStartOptions linear_start;
   BisectionOptions bisection;
   std::uint64_t seed = 1;
   int num_threads = 1;
@@ -60,6 +67,7 @@ struct KrotOptions {
   void Visit(Visitor&& visit) {
     visit("start", start);
     visit("threshold_px", threshold_px);
+    visit("threshold_sigmas", threshold_sigmas);
     visit("loose_factor", loose_factor);
     visit("use_bracket", use_bracket);
     visit("max_lp_views", max_lp_views);
@@ -72,6 +80,7 @@ struct KrotOptions {
     visit("use_epipolar_filter", use_epipolar_filter);
     visit("max_off_axis_deg", max_off_axis_deg);
     visit("robust_start", robust_start);
+    visit("linear_start", linear_start);
     visit("bisection", bisection);
     visit("seed", seed);
   }
@@ -128,6 +137,10 @@ struct KrotSolution {
 /// @param cam_from_world  one rotation per view named in `tracks`; further ones are ignored.
 /// @param tracks          bearings unit, in the camera frame.
 /// @param camera          converts pixels to normalised units (MeanFocal) and nothing else.
+/// @param sigma_rad       standard deviations of the orientations against the first one, where
+/// known.
+///                        Between views the difference of their variances counts, as for an
+///                        odometry's chain: what views share moves them together.
 /// @return  see KrotSolution. Throws std::invalid_argument when an option is out of range, a track
 ///          names a view without rotation, or the camera has no focal length.
 /// Error:   truth to 1e-6 (relative to the scene) on clean scenes (KnownRotation tests).
@@ -143,7 +156,8 @@ struct KrotSolution {
 KrotSolution SolveKnownRotation(const RotationMap& cam_from_world,
                                 const std::vector<Track>& tracks,
                                 const Camera& camera,
-                                const KrotOptions& options);
+                                const KrotOptions& options,
+                                const std::map<FrameId, double>& sigma_rad = {});
 
 /// Name of a status or reason as the summary file writes it.
 std::string ToString(KrotStatus status);

@@ -320,58 +320,10 @@ const std::vector<ColmapModel>& ColmapModels() {
   return kModels;
 }
 
-Camera ReadColmapLine(const fs::path& file, const std::vector<std::string>& words) {
-  const std::string who = "camera " + words[0] + ": ";
-  const auto& models = ColmapModels();
-  const auto found = std::find_if(models.begin(), models.end(), [&](const ColmapModel& model) {
-    return words[1] == model.name;
-  });
-  if (found == models.end()) {
-    std::string known;
-    for (const ColmapModel& model : models) {
-      known.append(known.empty() ? "" : ", ").append(model.name);
-    }
-    Fail(file, who + "model is '" + words[1] + "', must be one of " + known);
-  }
-  const std::size_t num_given = words.size() - std::min<std::size_t>(words.size(), 4);
-  if (num_given != found->parameters.size()) {
-    Fail(file,
-         who + found->name + " has " + std::to_string(num_given) + " parameters, must have " +
-             std::to_string(found->parameters.size()));
-  }
-  Camera camera;
-  camera.model = found->model;
-  camera.width = PixelCount(file, who + "width", words[2]);
-  camera.height = PixelCount(file, who + "height", words[3]);
-  for (std::size_t k = 0; k < num_given; ++k) {
-    const std::string& name = found->parameters[k];
-    const std::string& text = words[4 + k];
-    std::string key = who + (name == "0" ? "k" + std::to_string(k - 5) : name);
-    const double value = FiniteNumber(file, key, text);
-    if (name == "f") camera.fx = camera.fy = PositiveNumber(file, key, text);
-    if (name == "fx") camera.fx = PositiveNumber(file, key, text);
-    if (name == "fy") camera.fy = PositiveNumber(file, key, text);
-    if (name == "cx") camera.cx = value - 0.5;
-    if (name == "cy") camera.cy = value - 0.5;
-    if (name == "k1") camera.distortion[0] = value;
-    if (name == "k2") camera.distortion[1] = value;
-    if (name == "p1") camera.distortion[2] = value;
-    if (name == "p2") camera.distortion[3] = value;
-    if (name == "k3") camera.distortion[camera.model == CameraModel::kRadtan ? 4 : 2] = value;
-    if (name == "k4") camera.distortion[3] = value;
-    if (name == "0" && value != 0.0) {
-      key.append(" is ").append(text);
-      Fail(file, key.append(", but a denominator of the distortion is not supported"));
-    }
-  }
-  camera.model = WithoutEmptyDistortion(camera);
-  return camera;
-}
-
 Camera ReadColmap(const fs::path& file, const std::vector<std::vector<std::string>>& lines) {
-  const Camera camera = ReadColmapLine(file, lines.front());
+  const Camera camera = ReadColmapCamera(file, lines.front());
   for (const std::vector<std::string>& words : lines) {
-    if (words.size() < 4 || ReadColmapLine(file, words) != camera) {
+    if (words.size() < 4 || ReadColmapCamera(file, words) != camera) {
       Fail(file,
            "cameras " + lines.front().front() + " and " + words.front() +
                " differ; keep the line of the one to use");
@@ -445,6 +397,54 @@ std::string NumberText(double value) {
 }
 
 }  // namespace
+
+Camera ReadColmapCamera(const fs::path& file, const std::vector<std::string>& words) {
+  const std::string who = "camera " + words[0] + ": ";
+  const auto& models = ColmapModels();
+  const auto found = std::find_if(models.begin(), models.end(), [&](const ColmapModel& model) {
+    return words[1] == model.name;
+  });
+  if (found == models.end()) {
+    std::string known;
+    for (const ColmapModel& model : models) {
+      known.append(known.empty() ? "" : ", ").append(model.name);
+    }
+    Fail(file, who + "model is '" + words[1] + "', must be one of " + known);
+  }
+  const std::size_t num_given = words.size() - std::min<std::size_t>(words.size(), 4);
+  if (num_given != found->parameters.size()) {
+    Fail(file,
+         who + found->name + " has " + std::to_string(num_given) + " parameters, must have " +
+             std::to_string(found->parameters.size()));
+  }
+  Camera camera;
+  camera.model = found->model;
+  camera.width = PixelCount(file, who + "width", words[2]);
+  camera.height = PixelCount(file, who + "height", words[3]);
+  for (std::size_t k = 0; k < num_given; ++k) {
+    const std::string& name = found->parameters[k];
+    const std::string& text = words[4 + k];
+    std::string key = who + (name == "0" ? "k" + std::to_string(k - 5) : name);
+    const double value = FiniteNumber(file, key, text);
+    if (name == "f") camera.fx = camera.fy = PositiveNumber(file, key, text);
+    if (name == "fx") camera.fx = PositiveNumber(file, key, text);
+    if (name == "fy") camera.fy = PositiveNumber(file, key, text);
+    if (name == "cx") camera.cx = value - 0.5;
+    if (name == "cy") camera.cy = value - 0.5;
+    if (name == "k1") camera.distortion[0] = value;
+    if (name == "k2") camera.distortion[1] = value;
+    if (name == "p1") camera.distortion[2] = value;
+    if (name == "p2") camera.distortion[3] = value;
+    if (name == "k3") camera.distortion[camera.model == CameraModel::kRadtan ? 4 : 2] = value;
+    if (name == "k4") camera.distortion[3] = value;
+    if (name == "0" && value != 0.0) {
+      key.append(" is ").append(text);
+      Fail(file, key.append(", but a denominator of the distortion is not supported"));
+    }
+  }
+  camera.model = WithoutEmptyDistortion(camera);
+  return camera;
+}
 
 Camera ReadCamera(const fs::path& path) {
   const fs::path file = FileToRead(path);

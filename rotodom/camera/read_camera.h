@@ -2,6 +2,7 @@
 
 #include <filesystem>
 #include <string>
+#include <vector>
 
 #include "rotodom/camera/camera.h"
 
@@ -37,6 +38,10 @@ namespace rotslam {
 /// Throws std::runtime_error in one line that names file and key: no such file, kind or model not
 /// known, a number missing, malformed, not finite, or not positive where it has to be.
 Camera ReadCamera(const std::filesystem::path& path);
+
+/// One camera of a COLMAP model from the words of its line in `cameras.txt`: id, model, width,
+/// height, parameters. Throws as ReadCamera does.
+Camera ReadColmapCamera(const std::filesystem::path& file, const std::vector<std::string>& words);
 
 /// `camera` in our own form; ReadCamera gives back the very same numbers.
 std::string CameraYaml(const Camera& camera);

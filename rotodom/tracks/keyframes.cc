@@ -59,6 +59,7 @@ std::optional<std::string> KeyframeOptions::Problem() const {
   if (!(min_shared_ratio >= 0.0 && min_shared_ratio < 1.0)) {
     return OutOfRange("min_shared_ratio", min_shared_ratio, "0 or more and below 1");
   }
+  if (every_frames < 0) return OutOfRange("every_frames", every_frames, "at least 0");
   return std::nullopt;
 }
 
@@ -94,6 +95,10 @@ std::set<FrameId> SelectKeyframes(const RotationMap& cam_from_world,
       continue;
     }
     if (rays(frame).empty()) continue;
+    if (options.every_frames > 0) {
+      if (frame.value - keyframe.value >= options.every_frames) take(frame);
+      continue;
+    }
     Overlap overlap = Compare(rays(keyframe), rays(frame));
     if (overlap.shared_ratio < options.min_shared_ratio && before > keyframe) {
       // Too late: the frame before still shares enough.

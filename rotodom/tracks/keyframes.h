@@ -18,6 +18,9 @@ struct KeyframeOptions {
   // It becomes one before fewer than this share of the last keyframe's tracks is left, so that
   // tracks link neighbouring keyframes.
   double min_shared_ratio = 0.35;
+  // When positive, every so many frames one is a keyframe instead, whatever it shows; held
+  // stretches have theirs all the same.
+  int every_frames = 0;
 
   std::optional<std::string> Problem() const;
 
@@ -25,6 +28,7 @@ struct KeyframeOptions {
   void Visit(Visitor&& visit) {
     visit("min_parallax_deg", min_parallax_deg);
     visit("min_shared_ratio", min_shared_ratio);
+    visit("every_frames", every_frames);
   }
 };
 

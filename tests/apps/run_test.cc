@@ -64,6 +64,7 @@ TEST_P(OnBothSequences, WritesItsFilesAndNoOthers) {
   EXPECT_THAT(FileNames(Out()),
               ElementsAre("cloud.ply",
                           "keyframes_tum.txt",
+                          "known_rotation.txt",
                           "loops.csv",
                           "rotations.csv",
                           "rotations_tum.txt",

@@ -60,7 +60,7 @@ TEST_F(SharedData, Kitti00) {
       options);
   EXPECT_EQ(metrics.num_poses, 200);
   EXPECT_LE(metrics.rpe1_deg, 0.080);  // ORB-SLAM2's; the truth's own error is 0.061
-  EXPECT_LT(metrics.ate_m.value_or(1e9), 2.0);
+  EXPECT_LT(metrics.ate_m.value_or(1e9), 1.2);
   EXPECT_GT(CountPlyPoints(Out() / "cloud.ply"), 5000);
 }
 
@@ -71,7 +71,7 @@ TEST_F(SharedData, SevenScenesKitchen) {
   EXPECT_EQ(NumPoses("trajectory_tum.txt"), FileNames(Data("7scenes_kitchen/images")).size());
   const TrajectoryMetrics metrics = Compare(truth, Out() / "trajectory_tum.txt");
   EXPECT_LE(metrics.rpe1_deg, 0.247);  // ORB-SLAM2's
-  EXPECT_LT(metrics.ate_m.value_or(1e9), 0.10);
+  EXPECT_LT(metrics.ate_m.value_or(1e9), 0.05);
   EXPECT_GT(CountPlyPoints(Out() / "cloud.ply"), 5000);
 }
 

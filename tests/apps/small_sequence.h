@@ -94,6 +94,7 @@ class SmallSequenceTest : public testing::Test {
     EXPECT_THAT(FileNames(Out()),
                 testing::ElementsAre("cloud.ply",
                                      "keyframes_tum.txt",
+                                     "known_rotation.txt",
                                      "loops.csv",
                                      "rotations.csv",
                                      "rotations_tum.txt",

@@ -7,24 +7,6 @@
 
 namespace rotslam {
 
-/// A camera driving along a gently turning street, points on both sides.
-struct BaSceneOptions {
-  int num_frames = 20;
-  int num_points = 400;
-  double spacing = 1.0;  // path length per frame
-  double noise_px = 0.0;
-  double outlier_ratio = 0.0;  // of observations, 15 to 150 px off
-  int still_first = 0;         // frames still_first .. still_last rotate in place
-  int still_last = -1;
-  std::uint32_t seed = 1;
-};
-
-struct BaScene {
-  Camera camera;
-  Reconstruction truth;  // with noisy observations
-  std::set<std::pair<TrackId, FrameId>> outliers;
-};
-
 inline Camera BaCamera(CameraModel model = CameraModel::kPinhole) {
   Camera camera;
   camera.model = model;
@@ -39,6 +21,25 @@ inline Camera BaCamera(CameraModel model = CameraModel::kPinhole) {
   return camera;
 }
 
+/// A camera driving along a gently turning street, points on both sides.
+struct BaSceneOptions {
+  int num_frames = 20;
+  int num_points = 400;
+  double spacing = 1.0;  // path length per frame
+  double noise_px = 0.0;
+  double outlier_ratio = 0.0;  // of observations, 15 to 150 px off
+  int still_first = 0;         // frames still_first .. still_last rotate in place
+  int still_last = -1;
+  std::uint32_t seed = 1;
+  Camera camera = BaCamera();
+};
+
+struct BaScene {
+  Camera camera;
+  Reconstruction truth;  // with noisy observations
+  std::set<std::pair<TrackId, FrameId>> outliers;
+};
+
 inline BaScene MakeBaScene(const BaSceneOptions& options) {
   std::mt19937 random(options.seed);
   const auto uniform = [&](double low, double high) {
@@ -49,7 +50,7 @@ inline BaScene MakeBaScene(const BaSceneOptions& options) {
     return std::sqrt(-2.0 * std::log(u)) * std::cos(uniform(0.0, 2.0 * std::numbers::pi));
   };
   BaScene scene;
-  scene.camera = BaCamera();
+  scene.camera = options.camera;
   double heading = 0.0;
   Eigen::Vector3d center = Eigen::Vector3d::Zero();
   for (int k = 0; k < options.num_frames; ++k) {

@@ -46,7 +46,7 @@ TEST(RefineBundle, FindsTheTruthOnACleanStreet) {
   EXPECT_LT(MaxRotationErrorDeg(result.reconstruction, scene.truth), 1e-5);
   EXPECT_LT(result.summary.after.rms_px, 1e-4);
   EXPECT_GT(result.summary.before.rms_px, 1.0);
-  EXPECT_EQ(result.summary.rounds.size(), 3U);
+  EXPECT_EQ(result.summary.rounds.size(), 4U);  // and the lens that was not needed
   EXPECT_TRUE(result.weak_frames.empty());
   EXPECT_GT(result.summary.num_points, 380);  // all but the shallow ones
 }
@@ -250,6 +250,62 @@ TEST(RefineBundle, FramesWithTooFewObservationsAreNamedAndLoseTheirPlace) {
   EXPECT_TRUE(result.reconstruction.cam_from_world.contains(lonely));
   EXPECT_FALSE(result.reconstruction.center_in_world.contains(lonely));
   EXPECT_LT(CenterError(result.reconstruction, scene.truth), 1e-6);
+}
+
+TEST(RefineBundle, RefinesTheDistortionThatACalibrationHasLeft) {
+  // Seen through a lens that bends by 22 px at the image's side, calibrated as if it did not.
+  Camera lens = BaCamera(CameraModel::kRadtan);
+  lens.distortion = {0.05, -0.01, 0.0, 0.0, 0.0};
+  BaScene scene =
+      MakeBaScene({.num_frames = 40, .num_points = 1500, .noise_px = 0.2, .camera = lens});
+  scene.camera = BaCamera();
+  const BundleProblem problem = PerturbedProblem(scene, 0.1, 0.5);
+  BundleOptions options;
+  options.lens.distortion_sigma = 0.05;
+  const BundleResult refined = RefineBundle(problem, options);
+  options.lens.refine_distortion = false;
+  const BundleResult held = RefineBundle(problem, options);
+  ASSERT_TRUE(refined.Usable() && held.Usable());
+  EXPECT_TRUE(refined.summary.lens_refined);
+  EXPECT_NEAR(refined.camera.distortion[0], 0.05, 5e-3);
+  EXPECT_EQ(refined.camera.fx, scene.camera.fx);
+  EXPECT_FALSE(held.summary.lens_refined);
+  EXPECT_EQ(held.camera, scene.camera);
+  EXPECT_LT(CenterError(refined.reconstruction, scene.truth),
+            0.5 * CenterError(held.reconstruction, scene.truth));
+  // Bearings follow the lens.
+  const Observation& observation = refined.reconstruction.tracks.front().observations.front();
+  EXPECT_LT((observation.bearing - *refined.camera.Unproject(observation.keypoint_px)).norm(),
+            1e-12);
+}
+
+TEST(RefineBundle, RefinesAFocalLengthWhenAsked) {
+  Camera lens = BaCamera();
+  lens.fx *= 1.02;
+  lens.fy *= 1.02;
+  BaScene scene =
+      MakeBaScene({.num_frames = 40, .num_points = 1500, .noise_px = 0.2, .camera = lens});
+  scene.camera = BaCamera();
+  BundleOptions options;
+  options.lens.refine_focal = true;
+  options.lens.refine_distortion = false;
+  options.lens.focal_sigma = 0.05;
+  options.lens.min_gain = 0.0;
+  options.coarse.function_tolerance = 1e-8;
+  const BundleResult result = RefineBundle(PerturbedProblem(scene, 0.1, 0.5), options);
+  ASSERT_TRUE(result.Usable());
+  EXPECT_NEAR(result.camera.fx / lens.fx, 1.0, 2e-3);
+  EXPECT_EQ(result.camera.model, CameraModel::kPinhole);
+}
+
+TEST(RefineBundle, LeavesAGoodCalibrationToTheLastBit) {
+  for (const std::uint32_t seed : {1U, 2U, 3U}) {
+    const BaScene scene = MakeBaScene({.noise_px = 0.5, .seed = seed});
+    const BundleResult result = RefineBundle(PerturbedProblem(scene, 0.1, 0.5), {});
+    ASSERT_TRUE(result.Usable());
+    EXPECT_FALSE(result.summary.lens_refined) << result.summary.lens_gain;
+    EXPECT_EQ(result.camera, scene.camera);
+  }
 }
 
 TEST(RefineBundle, SaysSoWhenThereIsTooLittle) {

@@ -84,6 +84,30 @@ TEST_P(ReprojectionForEveryCamera, JacobiansOfCostsEqualCentralDifferences) {
   ExpectJacobiansAgree(ReprojectionCost(camera, {600.0, 200.0}, 0.7),
                        {quaternion, {0.4, -0.3, 0.2}, {1.1, -0.7, 4.0}});
   ExpectJacobiansAgree(DirectionCost(camera, {600.0, 200.0}, 1.3), {quaternion, {0.4, -0.3, 2.0}});
+  const std::vector<double> lens = {1.02, -0.05, 0.03};
+  ExpectJacobiansAgree(LensReprojectionCost(camera, {600.0, 200.0}, 0.7),
+                       {quaternion, {0.4, -0.3, 0.2}, {1.1, -0.7, 4.0}, lens});
+  ExpectJacobiansAgree(LensDirectionCost(camera, {600.0, 200.0}, 1.3),
+                       {quaternion, {0.4, -0.3, 2.0}, lens});
+}
+
+TEST(LensPriorCost, IsZeroAtWhatIsExpectedAndItsJacobianEqualsCentralDifferences) {
+  const LensPriorCost cost({1.0, -0.1, 0.02}, {0.003, 0.005, 0.1});
+  const double expected[3] = {1.0, -0.1, 0.02};
+  const double* parameters[1] = {expected};
+  double residuals[3];
+  ASSERT_TRUE(cost.Evaluate(parameters, residuals, nullptr));
+  for (const double residual : residuals) EXPECT_EQ(residual, 0.0);
+  ExpectJacobiansAgree(cost, {{1.01, -0.09, 0.0}});
+}
+
+TEST(WithLens, UndoesLensOfAndTurnsAPinholeIntoRadtanOnlyWhereItBends) {
+  const Camera pinhole = BaCamera();
+  EXPECT_EQ(WithLens(pinhole, LensOf(pinhole, pinhole)), pinhole);
+  const Camera bent = WithLens(pinhole, {1.01, 0.02, -0.01});
+  EXPECT_EQ(bent.model, CameraModel::kRadtan);
+  EXPECT_FALSE(bent.Problem());
+  EXPECT_LT((LensOf(bent, pinhole) - LensParameters(1.01, 0.02, -0.01)).norm(), 1e-15);
 }
 
 TEST(ScaleAnchorCost, IsZeroAtTheStartAndItsJacobianEqualsCentralDifferences) {

@@ -1,7 +1,9 @@
 #include "krot/known_rotation.h"
 
 #include <algorithm>
+#include <cmath>
 #include <limits>
+#include <map>
 #include <stdexcept>
 
 #include <gtest/gtest.h>
@@ -73,6 +75,37 @@ TEST(SolveKnownRotation, ClimbsTheLadderOfNoise) {
     EXPECT_LT(ErrorOf(solution, scene).max, rung.max_error) << rung.rotation_noise_deg;
     EXPECT_GT(solution.point_in_world.size(), 0.95 * static_cast<double>(scene.tracks.size()));
   }
+}
+
+TEST(SolveKnownRotation, ThresholdsFollowTheOrientationsUncertainty) {
+  SceneOptions scene_options = Street(20, 800);
+  scene_options.noise_px = 0.5;
+  Scene scene = MakeScene(scene_options);
+  // An odometry's drift: steps of 0.25 deg per axis.
+  SceneRandom random(5);
+  Rotation drift;
+  std::map<FrameId, double> sigma_rad;
+  double variance = 0.0;
+  for (auto& [frame, rotation] : scene.cam_from_world) {
+    rotation = drift * rotation;
+    sigma_rad[frame] = std::sqrt(variance);
+    const double step = 0.25 * kRadFromDeg;
+    drift = Rotation::Exp({random.Normal(step), random.Normal(step), random.Normal(step)}) * drift;
+    variance += step * step;
+  }
+  KrotOptions options;
+  options.use_bracket = false;
+  const KrotSolution fixed =
+      SolveKnownRotation(scene.cam_from_world, scene.tracks, scene.camera, options);
+  const KrotSolution grown =
+      SolveKnownRotation(scene.cam_from_world, scene.tracks, scene.camera, options, sigma_rad);
+  ASSERT_TRUE(fixed.Usable() && grown.Usable());
+  EXPECT_LT(grown.removed.size(), 0.5 * static_cast<double>(fixed.removed.size()));
+  // Uncertainty that all views share is none between them.
+  for (auto& [frame, sigma] : sigma_rad) sigma = 0.1;
+  const KrotSolution shared =
+      SolveKnownRotation(scene.cam_from_world, scene.tracks, scene.camera, options, sigma_rad);
+  EXPECT_EQ(shared.removed.size(), fixed.removed.size());
 }
 
 TEST(SolveKnownRotation, TenPercentOutliersAreRemovedAndChangeLittle) {

@@ -59,6 +59,14 @@ TEST(SelectKeyframes, TakesOneWheneverTheParallaxHasGrown) {
   EXPECT_EQ(Select(MakeWalk(15, 0.3), {}, wide), (List{0, 7, 14}));
 }
 
+TEST(SelectKeyframes, TakesEveryNthWhenAsked) {
+  KeyframeOptions every;
+  every.every_frames = 3;
+  EXPECT_EQ(Select(MakeWalk(8, 0.3), {}, every), (List{0, 3, 6, 7}));
+  EXPECT_EQ(Select(MakeWalk(12, 0.3), {{FrameId{4}, FrameId{8}, 1.0}}, every),
+            (List{0, 3, 4, 8, 11}));
+}
+
 TEST(SelectKeyframes, TurningAloneGivesNone) {
   EXPECT_EQ(Select(MakeWalk(12, 0.0)), (List{0, 11}));
 }
@@ -134,6 +142,8 @@ TEST(SelectKeyframes, IgnoresObservationsInFramesWithoutOrientation) {
 TEST(KeyframeOptions, NamesTheFirstFieldOutOfRange) {
   EXPECT_FALSE(KeyframeOptions{}.Problem());
   KeyframeOptions options;
+  options.every_frames = -1;
+  EXPECT_TRUE(options.Problem().value_or("none").starts_with("every_frames is -1"));
   options.min_shared_ratio = 1.0;
   EXPECT_TRUE(options.Problem().value_or("none").starts_with("min_shared_ratio is 1"));
   options.min_parallax_deg = 0.0;

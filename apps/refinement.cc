@@ -1,0 +1,112 @@
+#include "apps/refinement.h"
+
+#include <algorithm>
+#include <map>
+#include <utility>
+
+#include "rotodom/tracks/keyframes.h"
+
+namespace rotslam {
+namespace {
+
+// Keyframes of each component of the known-rotation solution, by first keyframe.
+std::vector<MapComponent> ComponentsOf(const KrotSolution& krot) {
+  std::map<int, MapComponent> by_number;
+  for (const auto& [frame, number] : krot.component) {
+    if (krot.center_in_world.contains(frame)) by_number[number].keyframes.insert(frame);
+  }
+  std::vector<MapComponent> components;
+  for (auto& [number, component] : by_number) {
+    if (component.keyframes.size() >= 2) components.push_back(std::move(component));
+  }
+  std::sort(components.begin(), components.end(), [](const MapComponent& a, const MapComponent& b) {
+    return *a.keyframes.begin() < *b.keyframes.begin();
+  });
+  return components;
+}
+
+// Bundle adjustment of one component, in its own scale.
+BundleResult RefineComponent(const MapComponent& component,
+                             const RotationMap& rotations,
+                             const KrotSolution& krot,
+                             const std::vector<Track>& tracks,
+                             const std::vector<HeldStretch>& held,
+                             const Camera& camera,
+                             const BundleOptions& options) {
+  BundleProblem problem;
+  problem.camera = camera;
+  for (const FrameId frame : component.keyframes) {
+    problem.start.cam_from_world[frame] = rotations.at(frame);
+    problem.start.center_in_world[frame] = krot.center_in_world.at(frame);
+  }
+  for (const HeldStretch& stretch : held) {
+    if (component.keyframes.contains(stretch.first) && component.keyframes.contains(stretch.last)) {
+      problem.shared_center[stretch.last] = stretch.first;
+    }
+  }
+  problem.start.tracks = RestrictTracks(tracks, component.keyframes, 2);
+  return RefineBundle(problem, options);
+}
+
+// Position of the component with the most observations.
+std::size_t LargestComponent(const std::vector<MapComponent>& components,
+                             const std::vector<Track>& tracks) {
+  std::map<FrameId, int> count;
+  for (const Track& track : tracks) {
+    for (const Observation& observation : track.observations) ++count[observation.frame];
+  }
+  std::size_t largest = 0;
+  int most = 0;
+  for (std::size_t k = 0; k < components.size(); ++k) {
+    int sum = 0;
+    for (const FrameId frame : components[k].keyframes) sum += count[frame];
+    if (sum <= most) continue;
+    most = sum;
+    largest = k;
+  }
+  return largest;
+}
+
+}  // namespace
+
+std::vector<Track> WithBearingsOf(const Camera& camera, std::vector<Track> tracks) {
+  for (Track& track : tracks) {
+    for (Observation& observation : track.observations) {
+      const auto bearing = camera.Unproject(observation.keypoint_px);
+      if (bearing) observation.bearing = *bearing;
+    }
+  }
+  return tracks;
+}
+
+RefinedComponents RefineComponents(const RotationMap& cam_from_world,
+                                   const KrotSolution& krot,
+                                   const std::vector<Track>& tracks,
+                                   const std::vector<HeldStretch>& held,
+                                   const Camera& camera,
+                                   const BundleOptions& options) {
+  RefinedComponents refined;
+  refined.camera = camera;
+  refined.components = ComponentsOf(krot);
+  refined.bundles.resize(refined.components.size());
+  if (refined.components.empty()) return refined;
+  const auto refine = [&](std::size_t k,
+                          const std::vector<Track>& seen,
+                          const BundleOptions& bundle_options) {
+    refined.bundles[k] = RefineComponent(
+        refined.components[k], cam_from_world, krot, seen, held, refined.camera, bundle_options);
+  };
+  const std::size_t first = LargestComponent(refined.components, tracks);
+  refine(first, tracks, options);
+  refined.camera = refined.bundles[first].camera;
+  if (refined.components.size() == 1) return refined;
+  BundleOptions same_lens = options;
+  same_lens.lens.refine_focal = same_lens.lens.refine_distortion = false;
+  const std::vector<Track> seen = WithBearingsOf(refined.camera, tracks);
+  for (std::size_t k = 0; k < refined.components.size(); ++k) {
+    if (k != first) refine(k, seen, same_lens);
+  }
+  return refined;
+}
+
+}  // namespace rotslam

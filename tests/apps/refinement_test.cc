@@ -1,0 +1,117 @@
+// Known rotation and bundle adjustment in one chain, as `run` and `solve` have it.
+
+#include "apps/refinement.h"
+
+#include <algorithm>
+#include <cmath>
+#include <string>
+
+#include <gtest/gtest.h>
+
+#include "tests/scenes/alignment.h"
+#include "tests/scenes/scene.h"
+
+namespace rotslam {
+namespace {
+
+SceneOptions Street() {
+  SceneOptions options;
+  options.path = ScenePath::kStreet;
+  options.num_views = 30;
+  options.num_points = 2000;
+  options.noise_px = 0.5;
+  options.rotation_noise_deg = 0.03;
+  return options;
+}
+
+// The same scene with a share of its observations at other pixels: the noise of the rest is the
+// same, so that only the outliers make a difference.
+Scene WithOutliers(Scene scene, double ratio) {
+  SceneRandom random(99);
+  for (Track& track : scene.tracks) {
+    for (Observation& observation : track.observations) {
+      if (random.Uniform(0.0, 1.0) >= ratio) continue;
+      observation.keypoint_px = {random.Uniform(0.0, scene.camera.width),
+                                 random.Uniform(0.0, scene.camera.height)};
+      observation.bearing = *scene.camera.Unproject(observation.keypoint_px);
+      scene.outliers.insert({track.id, observation.frame});
+    }
+  }
+  return scene;
+}
+
+BundleResult SolveChain(const Scene& scene, const std::string& start) {
+  KrotOptions krot_options;
+  krot_options.start = start;
+  krot_options.use_bracket = start == "bisection";
+  const KrotSolution krot =
+      SolveKnownRotation(scene.cam_from_world, scene.tracks, scene.camera, krot_options);
+  EXPECT_TRUE(krot.Usable()) << krot.message;
+  RefinedComponents refined =
+      RefineComponents(scene.cam_from_world, krot, scene.tracks, {}, scene.camera, {});
+  EXPECT_EQ(refined.bundles.size(), 1U);
+  EXPECT_TRUE(refined.bundles.front().Usable()) << refined.bundles.front().message;
+  return std::move(refined.bundles.front());
+}
+
+double ErrorOf(const BundleResult& bundle, const Scene& scene) {
+  const CenterMap& centers = bundle.reconstruction.center_in_world;
+  return CompareCenters(
+             centers, scene.true_center_in_world, AlignCenters(centers, scene.true_center_in_world))
+      .rmse;
+}
+
+TEST(Chain, ThreeStartsEndInOneMinimum) {
+  const Scene scene = WithOutliers(MakeScene(Street()), 0.05);
+  const BundleResult l1 = SolveChain(scene, "l1");
+  for (const char* start : {"bisection", "linear"}) {
+    const BundleResult other = SolveChain(scene, start);
+    EXPECT_NEAR(static_cast<double>(other.summary.num_observations) / l1.summary.num_observations,
+                1.0,
+                1e-3)
+        << start;
+    EXPECT_NEAR(other.summary.final_cost / l1.summary.final_cost, 1.0, 1e-3) << start;
+    EXPECT_NE(other.summary.rounds.front().initial_cost, l1.summary.rounds.front().initial_cost);
+  }
+}
+
+struct Kept {
+  double outliers = 0.0;  // shares
+  double inliers = 0.0;
+};
+
+Kept KeptOf(const BundleResult& bundle, const Scene& scene) {
+  double outliers = 0.0;
+  double inliers = 0.0;
+  for (const Track& track : bundle.reconstruction.tracks) {
+    for (const Observation& observation : track.observations) {
+      const bool is_outlier = scene.outliers.contains({track.id, observation.frame});
+      ++(is_outlier ? outliers : inliers);
+    }
+  }
+  double num_inliers = -static_cast<double>(scene.outliers.size());
+  for (const Track& track : scene.tracks) {
+    num_inliers += static_cast<double>(track.observations.size());
+  }
+  return {outliers / static_cast<double>(scene.outliers.size()), inliers / num_inliers};
+}
+
+class ChainWithOutliers : public ::testing::TestWithParam<double> {};
+INSTANTIATE_TEST_SUITE_P(Ratios, ChainWithOutliers, ::testing::Values(0.01, 0.05, 0.1));
+
+TEST_P(ChainWithOutliers, RemovesThemAndKeepsTheRest) {
+  for (const std::uint64_t seed : {1U, 2U, 3U}) {
+    SceneOptions options = Street();
+    options.seed = seed;
+    const Scene clean = MakeScene(options);
+    const Scene dirty = WithOutliers(clean, GetParam());
+    const BundleResult with = SolveChain(dirty, "l1");
+    const Kept kept = KeptOf(with, dirty);
+    EXPECT_LE(kept.outliers, 0.05) << seed;
+    EXPECT_GE(kept.inliers, 0.98) << seed;
+    EXPECT_LE(ErrorOf(with, dirty), 1.5 * ErrorOf(SolveChain(clean, "l1"), clean)) << seed;
+  }
+}
+
+}  // namespace
+}  // namespace rotslam
