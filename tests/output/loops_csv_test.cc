@@ -26,7 +26,8 @@ TEST(LoopsCsv, HasOneLinePerRow) {
             "120,3,0.0625,187,2.5,1,1.04,0.5\n"
             "131,7,0.333333,0,0,0,1,0\n");
   WriteLoopsCsv(path, {});
-  EXPECT_EQ(ReadWholeFile(path), "frame,match,score,inliers,angle_deg,accepted,turn_scale,scaled_angle_deg\n");
+  EXPECT_EQ(ReadWholeFile(path),
+            "frame,match,score,inliers,angle_deg,accepted,turn_scale,scaled_angle_deg\n");
 }
 
 TEST(LoopsCsv, RefusesNumbersThatAreNotFinite) {
