@@ -62,22 +62,25 @@ class Verifier {
 struct Opinion {
   Connection connection;
   Rotation view_from_world;
-  WayAround way;
 };
 
-// Whether the cycle view - one old place - another one - view closes, the turn between the places
-// being as wrong as all others.
-bool DoAgree(const Opinion& one, const Opinion& other, double max_cycle_deg) {
+// What may be wrong with the rotation around a short cycle; turns are wrong by this share.
+struct CycleBound {
+  double angle_deg = 0.0;
+  double turn_error = 0.0;
+};
+
+// Whether the cycle view - one old place - another one - view closes.
+bool DoAgree(const Opinion& one, const Opinion& other, const CycleBound& bound) {
   const Rotation around = other.view_from_world * one.view_from_world.Inverse();
   const Rotation other_from_one =
       other.connection.edge.j_from_i.Inverse() * one.connection.edge.j_from_i;
-  return around.AngleDeg() <=
-         max_cycle_deg + std::abs(one.way.turn_scale - 1.0) * other_from_one.AngleDeg();
+  return around.AngleDeg() <= bound.angle_deg + bound.turn_error * other_from_one.AngleDeg();
 }
 
 // The opinions that agree with one of them, that being the one around which most matches do;
 // positions, the most certain one first.
-std::vector<int> LargestAgreement(const std::vector<Opinion>& opinions, double max_cycle_deg) {
+std::vector<int> LargestAgreement(const std::vector<Opinion>& opinions, const CycleBound& bound) {
   const auto inliers = [&](int index) { return opinions[index].connection.edge.num_inliers; };
   const int count = static_cast<int>(opinions.size());
   std::vector<int> largest;
@@ -86,7 +89,7 @@ std::vector<int> LargestAgreement(const std::vector<Opinion>& opinions, double m
     std::vector<int> agreeing = {center};
     int num_inliers = inliers(center);
     for (int other = 0; other < count; ++other) {
-      if (other == center || !DoAgree(opinions[center], opinions[other], max_cycle_deg)) continue;
+      if (other == center || !DoAgree(opinions[center], opinions[other], bound)) continue;
       agreeing.push_back(other);
       num_inliers += inliers(other);
     }
@@ -180,16 +183,21 @@ LoopEvidence VerifyLoop(const Features& view,
       continue;
     }
     const Rotation view_from_world = edge->edge.j_from_i * old_from_world;
-    const WayAround way =
-        is_way_known ? ScaleTurns(cam_from_world, edge->edge, options.max_turn_error) : WayAround();
-    opinions.push_back({*std::move(edge), view_from_world, way});
+    opinions.push_back({*std::move(edge), view_from_world});
   }
-  const std::vector<int> agreeing = LargestAgreement(opinions, options.max_cycle_deg);
+  const auto scale_turns = [&](const Opinion& opinion) {
+    return is_way_known
+               ? ScaleTurns(cam_from_world, opinion.connection.edge, options.max_turn_error)
+               : WayAround();
+  };
+  // The way to one place says how wrong turns are; that to the next one says the same.
+  const double turn_error = std::abs(scale_turns(opinions.front()).turn_scale - 1.0);
+  const std::vector<int> agreeing = LargestAgreement(opinions, {options.max_cycle_deg, turn_error});
   const Opinion& best = opinions[agreeing.front()];
   evidence.match = best.connection.edge.i;
   evidence.num_inliers = best.connection.edge.num_inliers;
   evidence.angle_deg = (best.view_from_world * present_view_from_world.Inverse()).AngleDeg();
-  evidence.way = best.way;
+  evidence.way = scale_turns(best);
   const int num_frames = view.frame.value - evidence.match.value;
   const double drift_deg = options.max_drift_deg + options.max_drift_deg_per_sqrt_frame *
                                                        std::sqrt(static_cast<double>(num_frames));
