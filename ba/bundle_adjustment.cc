@@ -113,7 +113,7 @@ class Rounds {
   void TryLens(const BundleRound& round, BundleState& state) {
     const LensOptions& lens = options_.lens;
     if (!good_ || !round.enabled) return;
-    if (!lens.refine_focal && !lens.refine_distortion) return;
+    if (!lens.refine_focal && !lens.refine_principal_point && !lens.refine_distortion) return;
     const BundleState before = state;
     refine_lens_ = true;
     Minimise("lens", round, std::chrono::steady_clock::now(), state);
