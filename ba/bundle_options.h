@@ -95,7 +95,7 @@ struct BundleOptions {
   int preparing_observations = 300;
   // The last round is repeated, at most so many times in all, until classification changes less
   // than this share of the observations: then the result does not depend on where it started.
-  int max_fine_rounds = 4;
+  int max_fine_rounds = 6;
   double max_changed_share = 2e-4;
   // false holds the rotations in every round: they come out bit by bit as they went in.
   bool refine_rotations = true;
