@@ -30,7 +30,7 @@ struct KrotOptions {
   bool use_bracket = true;
   // Views that go into the start's programs. Components with more start from this many and grow
   // view by view from there.
-  int max_lp_views = 150;
+  int max_lp_views = 1000;
   // Observations per view in the start's programs.
   int observations_per_view = 40;
   // Tracks under this parallax come into the linear programs last, for the sake of conditioning.

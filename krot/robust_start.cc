@@ -57,7 +57,7 @@ bool SolveRound(const MinimaxProblem& problem,
                 const RobustStartOptions& options,
                 RobustStart& start) {
   // The rounds' answers only set prices.
-  const double tolerance = gamma > 0.0 ? 1e-4 : 1e-6;
+  const double tolerance = gamma > 0.0 ? 1e-3 : 1e-6;
   MinimaxLpResult lp = SolveProgram(problem, gamma, weights, options, tolerance);
   ++start.num_programs;
   if (lp.call != LpCallStatus::kCompleted) return false;
