@@ -97,6 +97,7 @@ Orientations FindOrientations(Input& input,
     }
     const LoopedEstimate estimate = odometry.AddFrame(frame->id, frame->timestamp_s, frame->image);
     orientations.timestamps_s.push_back(frame->timestamp_s);
+    orientations.image_names.push_back(frame->name);
     orientations.num_weak += estimate.report.weak;
     orientations.reports.push_back(estimate.report);
     progress.Step(frame->id.value + 1, std::to_string(estimate.report.num_inliers) + " inliers");

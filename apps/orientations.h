@@ -1,6 +1,7 @@
 #pragma once
 
 #include <map>
+#include <string>
 #include <vector>
 
 #include "apps/input.h"
@@ -15,7 +16,8 @@ namespace rotslam {
 
 /// What the first stage knows once the sequence has been read.
 struct Orientations : OdometryResult {
-  std::vector<double> timestamps_s;  // by frame id
+  std::vector<double> timestamps_s;      // by frame id
+  std::vector<std::string> image_names;  // by frame id
   int num_unreadable = 0;
   int num_predicted = 0;  // frames without an edge; their orientations are interpolated
   int num_weak = 0;

@@ -13,6 +13,7 @@
 #include "output/loops_csv.h"
 #include "output/ply.h"
 #include "output/rotations_csv.h"
+#include "output/run_map.h"
 #include "output/segments.h"
 #include "output/trajectory.h"
 
@@ -92,7 +93,8 @@ void WriteOrientations(const std::filesystem::path& directory, const Orientation
 void WritePositions(const std::filesystem::path& directory,
                     const Orientations& orientations,
                     const PositionResult& positions,
-                    const Camera& camera) {
+                    const Camera& camera,
+                    PlyForm form) {
   const Trajectory trajectory = MakeTrajectory(
       orientations.timestamps_s, positions.cam_from_world, positions.center_in_world);
   WriteTumTrajectory(directory / "trajectory_tum.txt", trajectory);
@@ -103,7 +105,14 @@ void WritePositions(const std::filesystem::path& directory,
   WriteTumTrajectory(
       directory / "keyframes_tum.txt",
       MakeTrajectory(orientations.timestamps_s, positions.cam_from_world, keyframe_centers));
-  WritePly(directory / "cloud.ply", MakeCloud(positions.cloud, camera));
+  WritePly(directory / "cloud.ply", MakeCloud(positions.cloud, camera), form);
+  std::vector<Frustum> frusta;
+  frusta.reserve(keyframe_centers.size());
+  const double size = FrustumSize(keyframe_centers);
+  for (const auto& [frame, center] : keyframe_centers) {
+    frusta.push_back({positions.cam_from_world.at(frame), center, size});
+  }
+  WriteFrustaPly(directory / "cameras.ply", frusta, camera, form);
   WriteSegments(directory / "segments.csv", Segments(positions));
 }
 
@@ -120,6 +129,32 @@ void WriteKnownRotationInput(const std::filesystem::path& directory,
   input.sigma_rad = OrientationSigmas(orientations);
   input.tracks = positions.keyframe_tracks;
   WriteKnownRotation(directory / "known_rotation.txt", input);
+}
+
+void WriteMaps(const std::filesystem::path& directory,
+               const Sequence& sequence,
+               const Orientations& orientations,
+               const PositionResult& positions) {
+  RunMap map;
+  map.camera = positions.camera;
+  map.image_folder = std::filesystem::absolute(sequence.image_folder()).lexically_normal().string();
+  map.is_video = sequence.kind() == SequenceKind::kVideo;
+  for (const auto& [frame, cam_from_world] : positions.cam_from_world) {
+    map.frames.push_back({frame,
+                          orientations.timestamps_s[frame.value],
+                          // Frames of a video have numbers; whoever extracts them adds the ending.
+                          orientations.image_names[frame.value] + (map.is_video ? ".png" : ""),
+                          positions.keyframes.contains(frame),
+                          cam_from_world,
+                          positions.center_in_world.at(frame)});
+  }
+  for (const RelativeRotation& edge : orientations.graph.edges()) {
+    map.edges.push_back({edge.i, edge.j, edge.num_inliers, edge.rotation_only});
+  }
+  map.tracks = JoinTracks(positions.keyframe_tracks, positions.map);
+  WriteRunMap(directory / "map.bin", map);
+  map.tracks = JoinTracks({}, positions.cloud);
+  WriteRunMap(directory / "map_all_frames.bin", map);
 }
 
 RunSummary StartSummary(const std::string& command,
@@ -181,6 +216,7 @@ void AddPositions(const PositionResult& positions, const Camera& camera, RunSumm
   summary.counts.push_back({"keyframes", count(positions.keyframes.size())});
   summary.counts.push_back({"map_points", count(positions.map.point_in_world.size())});
   summary.counts.push_back({"points", count(positions.cloud.point_in_world.size())});
+  summary.counts.push_back({"cloud_outliers", std::int64_t{positions.num_cloud_outliers}});
   summary.counts.push_back({"components", count(positions.components.size())});
   summary.counts.push_back({"resected_frames", std::int64_t{positions.num_resected}});
   summary.counts.push_back({"interpolated_frames", std::int64_t{positions.num_interpolated}});
