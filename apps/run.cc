@@ -88,6 +88,11 @@ void AddRunCommand(CLI::App& app, Action& action) {
       "run", "The whole chain: a sequence goes in, a trajectory and a point cloud come out");
   AddInputFlags(*command, flags->input);
   AddKrotFlags(*command, flags->krot);
+  command->add_option(
+      "--rotations",
+      flags->input.rotations,
+      "Orientations from elsewhere (a gimbal, an IMU, another SLAM), camera->world: "
+      "a TUM file or a rotations.csv; the images then give tracks and positions");
   command->add_flag("--ascii", flags->ascii, "Write the PLY files as text");
   AddCommonFlags(*command, flags->common);
   command->footer("Example: rotslam run kitti/sequences/00 --out runs/kitti00");

@@ -190,6 +190,10 @@ RunSummary StartSummary(const std::string& command,
   summary.rotodom = SummaryTable{
       {"mean_inliers_per_edge", inliers / static_cast<double>(orientations.graph.edges().size())},
       {"rotation_only_edges", rotation_only}};
+  if (orientations.given) {
+    summary.sequence.emplace_back("rotations_file", orientations.given->file);
+    summary.rotodom->emplace_back("given_disagreement_deg", orientations.given->disagreement_deg);
+  }
   const OdometrySeconds& seconds = orientations.seconds;
   summary.seconds = {{"pyramid", seconds.pyramid},
                      {"tracking", seconds.tracking},
