@@ -11,6 +11,7 @@
 
 #include "apps/command.h"
 #include "apps/config.h"
+#include "apps/map_descriptors.h"
 #include "apps/progress.h"
 #include "output/colmap_database.h"
 #include "output/colmap_model.h"
@@ -20,6 +21,7 @@
 #include "output/openmvg.h"
 #include "output/ply.h"
 #include "output/run_map.h"
+#include "output/stella_map.h"
 #include "output/trajectory.h"
 
 namespace rotslam {
@@ -110,6 +112,14 @@ const std::map<std::string, Format>& Formats() {
           WritePly(job.out,
                    MakeCloud(ToReconstruction(job.map), job.map.camera),
                    job.text ? PlyForm::kAscii : PlyForm::kBinary);
+        }}},
+      {"stella",
+       {false,
+        true,
+        "stella_vslam's map.msg; reads the images again",
+        [](const ExportJob& job) {
+          WriteStellaMap(
+              job.out, job.map, DescribeMap(job.map, job.image_folder, job.common.NumThreads()));
         }}},
       {"tum", {true, false, "TUM trajectory", [](const ExportJob& job) {
                  WriteTumTrajectory(job.out, ToTrajectory(job.map));

@@ -52,7 +52,7 @@ int Run(const RunFlags& flags) {
                  positions.camera,
                  flags.ascii ? PlyForm::kAscii : PlyForm::kBinary);
   WriteKnownRotationInput(directory, orientations, positions, input.camera);
-  WriteMaps(directory, *input.sequence, orientations, positions);
+  WriteMaps(directory, *input.sequence, orientations, positions, options.rotodom.features);
 
   RunSummary summary = StartSummary("run", input, orientations, DescribeOptions(options));
   AddPositions(positions, input.camera, summary);

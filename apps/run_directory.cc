@@ -11,6 +11,7 @@
 #include "output/g2o.h"
 #include "output/known_rotation_file.h"
 #include "output/loops_csv.h"
+#include "output/map_keypoints.h"
 #include "output/ply.h"
 #include "output/rotations_csv.h"
 #include "output/run_map.h"
@@ -64,6 +65,27 @@ std::vector<Segment> Segments(const PositionResult& positions) {
     segments.push_back(segment);
   }
   return segments;
+}
+
+// Looks every sighting up among its frame's features, whose keypoint it is to the last bit.
+void FindLevels(const std::map<FrameId, Features>& features, RunMap& map) {
+  for (const auto& [frame, keypoints] : ListKeypoints(map)) {
+    const auto found = features.find(frame);
+    if (found == features.end()) continue;
+    std::map<std::pair<double, double>, int> level_at;
+    for (int k = 0; k < found->second.size(); ++k) {
+      const Eigen::Vector2d& keypoint_px = found->second.keypoints_px[k];
+      level_at[{keypoint_px.x(), keypoint_px.y()}] = found->second.levels[k];
+    }
+    for (const MapKeypoint& keypoint : keypoints) {
+      MapTrack& entry = map.tracks[keypoint.track];
+      const Eigen::Vector2d& keypoint_px =
+          entry.track.observations[keypoint.observation].keypoint_px;
+      const auto level = level_at.find({keypoint_px.x(), keypoint_px.y()});
+      if (level == level_at.end()) continue;
+      entry.levels[keypoint.observation] = static_cast<std::uint8_t>(level->second);
+    }
+  }
 }
 
 }  // namespace
@@ -134,8 +156,11 @@ void WriteKnownRotationInput(const std::filesystem::path& directory,
 void WriteMaps(const std::filesystem::path& directory,
                const Sequence& sequence,
                const Orientations& orientations,
-               const PositionResult& positions) {
+               const PositionResult& positions,
+               const FeatureOptions& features) {
   RunMap map;
+  map.level_scale = features.scale_factor;
+  map.num_levels = features.num_levels;
   map.camera = positions.camera;
   map.image_folder = std::filesystem::absolute(sequence.image_folder()).lexically_normal().string();
   map.is_video = sequence.kind() == SequenceKind::kVideo;
@@ -152,8 +177,10 @@ void WriteMaps(const std::filesystem::path& directory,
     map.edges.push_back({edge.i, edge.j, edge.num_inliers, edge.rotation_only});
   }
   map.tracks = JoinTracks(positions.keyframe_tracks, positions.map);
+  FindLevels(orientations.features, map);
   WriteRunMap(directory / "map.bin", map);
   map.tracks = JoinTracks({}, positions.cloud);
+  FindLevels(orientations.features, map);
   WriteRunMap(directory / "map_all_frames.bin", map);
 }
 

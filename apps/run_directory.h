@@ -32,10 +32,12 @@ void WriteKnownRotationInput(const std::filesystem::path& directory,
 
 /// map.bin, the keyframes' map with all their tracks, and map_all_frames.bin, the cloud as all
 /// frames see it: what `rotslam export` reads.
+/// @param features  with which the orientations were found.
 void WriteMaps(const std::filesystem::path& directory,
                const Sequence& sequence,
                const Orientations& orientations,
-               const PositionResult& positions);
+               const PositionResult& positions,
+               const FeatureOptions& features);
 
 /// The parts of summary.json that `run` and `rotations` share.
 RunSummary StartSummary(const std::string& command,

@@ -78,19 +78,24 @@ void PutTrack(BinaryWriter& writer, const MapTrack& entry) {
     writer.Put(static_cast<float>(observation.keypoint_px.y()));
     writer.Put(static_cast<float>(observation.sigma_px));
     writer.Put(static_cast<std::uint8_t>(entry.fits[k]));
+    writer.Put(entry.levels[k]);
   }
 }
 
-MapTrack GetTrack(BinaryReader& reader, const Camera& camera, const std::set<FrameId>& frames) {
+MapTrack GetTrack(BinaryReader& reader,
+                  const Camera& camera,
+                  int num_levels,
+                  const std::set<FrameId>& frames) {
   MapTrack entry;
   Track& track = entry.track;
   track.id = TrackId{reader.Get<std::int32_t>()};
   const std::string who = "track " + std::to_string(track.id.value);
   for (std::uint8_t& value : track.rgb) value = reader.Get<std::uint8_t>();
   if (reader.Get<std::uint8_t>() != 0) entry.point_in_world = GetPosition(reader, "a point");
-  const auto count = reader.Count("observations", 17);
+  const auto count = reader.Count("observations", 18);
   track.observations.reserve(count);
   entry.fits.reserve(count);
+  entry.levels.reserve(count);
   for (std::uint64_t k = 0; k < count; ++k) {
     Observation observation;
     observation.frame = FrameId{reader.Get<std::int32_t>()};
@@ -98,6 +103,8 @@ MapTrack GetTrack(BinaryReader& reader, const Camera& camera, const std::set<Fra
     observation.keypoint_px.y() = reader.Get<float>();
     observation.sigma_px = reader.Get<float>();
     const bool fits = reader.Get<std::uint8_t>() != 0;
+    const auto level = reader.Get<std::uint8_t>();
+    if (level >= num_levels) reader.Fail(who + ": a level is beyond the pyramid");
     if (!observation.keypoint_px.allFinite()) reader.Fail(who + ": a keypoint is not finite");
     if (!(observation.sigma_px > 0.0)) reader.Fail(who + ": a sigma is not positive");
     if (!frames.contains(observation.frame)) {
@@ -112,8 +119,16 @@ MapTrack GetTrack(BinaryReader& reader, const Camera& camera, const std::set<Fra
     observation.bearing = *bearing;
     track.observations.push_back(observation);
     entry.fits.push_back(fits);
+    entry.levels.push_back(level);
   }
   return entry;
+}
+
+MapTrack WithoutPoint(const Track& track) {
+  return {track,
+          std::nullopt,
+          std::vector<bool>(track.observations.size(), false),
+          std::vector<std::uint8_t>(track.observations.size(), 0)};
 }
 
 }  // namespace
@@ -121,15 +136,13 @@ MapTrack GetTrack(BinaryReader& reader, const Camera& camera, const std::set<Fra
 std::vector<MapTrack> JoinTracks(const std::vector<Track>& tracks, const Reconstruction& solved) {
   std::map<TrackId, MapTrack> joined;
   for (const Track& track : tracks) {
-    joined[track.id] = {track, std::nullopt, std::vector<bool>(track.observations.size())};
+    joined[track.id] = WithoutPoint(track);
   }
   for (const Track& track : solved.tracks) {
     const auto point = solved.point_in_world.find(track.id);
     if (point == solved.point_in_world.end()) continue;
     MapTrack& entry = joined[track.id];
-    if (entry.fits.empty()) {
-      entry = {track, std::nullopt, std::vector<bool>(track.observations.size())};
-    }
+    if (entry.fits.empty()) entry = WithoutPoint(track);
     entry.point_in_world = point->second;
     std::set<FrameId> fitting;
     for (const Observation& observation : track.observations) fitting.insert(observation.frame);
@@ -148,6 +161,8 @@ RunMap KeyframesOnly(const RunMap& map) {
   part.camera = map.camera;
   part.image_folder = map.image_folder;
   part.is_video = map.is_video;
+  part.level_scale = map.level_scale;
+  part.num_levels = map.num_levels;
   std::set<FrameId> kept;
   for (const MapFrame& frame : map.frames) {
     if (!frame.is_keyframe) continue;
@@ -163,6 +178,7 @@ RunMap KeyframesOnly(const RunMap& map) {
       if (!kept.contains(entry.track.observations[k].frame)) continue;
       shorter.track.observations.push_back(entry.track.observations[k]);
       shorter.fits.push_back(entry.fits[k]);
+      shorter.levels.push_back(entry.levels[k]);
     }
     if (!shorter.fits.empty()) part.tracks.push_back(std::move(shorter));
   }
@@ -206,6 +222,8 @@ void WriteRunMap(const std::filesystem::path& path, const RunMap& map) {
   PutCamera(writer, map.camera);
   writer.PutName(map.image_folder);
   writer.Put(static_cast<std::uint8_t>(map.is_video));
+  writer.Put(map.level_scale);
+  writer.Put(static_cast<std::int32_t>(map.num_levels));
   writer.Put(static_cast<std::uint64_t>(map.frames.size()));
   for (const MapFrame& frame : map.frames) {
     writer.Put(static_cast<std::int32_t>(frame.id.value));
@@ -236,6 +254,12 @@ RunMap ReadRunMap(const std::filesystem::path& path) {
   map.camera = GetCamera(reader);
   map.image_folder = reader.Name();
   map.is_video = reader.Get<std::uint8_t>() != 0;
+  map.level_scale = reader.Get<double>();
+  map.num_levels = reader.Get<std::int32_t>();
+  if (!(map.level_scale > 1.0 && map.level_scale < 10.0) || map.num_levels < 1 ||
+      map.num_levels > 255) {
+    reader.Fail("its pyramid makes no sense");
+  }
   std::set<FrameId> frames;
   const auto num_frames = reader.Count("frames", 70);
   map.frames.reserve(num_frames);
@@ -254,7 +278,7 @@ RunMap ReadRunMap(const std::filesystem::path& path) {
   const auto num_tracks = reader.Count("tracks", 16);
   map.tracks.reserve(num_tracks);
   for (auto left = num_tracks; left > 0; --left) {
-    MapTrack track = GetTrack(reader, map.camera, frames);
+    MapTrack track = GetTrack(reader, map.camera, map.num_levels, frames);
     if (!map.tracks.empty() && track.track.id <= map.tracks.back().track.id) {
       reader.Fail("its tracks do not ascend");
     }

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <cstdint>
 #include <filesystem>
 #include <optional>
 #include <string>
@@ -26,7 +27,8 @@ struct MapFrame {
 struct MapTrack {
   Track track;
   std::optional<Eigen::Vector3d> point_in_world;
-  std::vector<bool> fits;  // one per observation; all false without a point
+  std::vector<bool> fits;            // one per observation; all false without a point
+  std::vector<std::uint8_t> levels;  // one per observation: pyramid level that shows it
 };
 
 /// An edge of the view-graph, as far as exports ask for it.
@@ -42,12 +44,15 @@ struct RunMap {
   Camera camera;             // refined; keypoints are pixels of its distorted image
   std::string image_folder;  // of the images; for a video, the file
   bool is_video = false;
+  // Of the pyramid that the levels belong to.
+  double level_scale = 1.2;
+  int num_levels = 8;
   std::vector<MapFrame> frames;  // all of them, ids ascend
   std::vector<MapTrack> tracks;  // ids ascend
   std::vector<MapEdge> edges;
 };
 
-/// Puts tracks and what was made of them together.
+/// Puts tracks and what was made of them together; levels are all 0.
 /// @param tracks  all sightings; those of tracks that only `solved` has are taken from there.
 /// @param solved  its tracks hold the sightings that fit; only those with a point count.
 std::vector<MapTrack> JoinTracks(const std::vector<Track>& tracks, const Reconstruction& solved);

@@ -1,6 +1,11 @@
 // `rotslam export` on what a run has left; the formats themselves are tested beside their writers.
 
+#include <algorithm>
+#include <bit>
+#include <cstdint>
 #include <filesystem>
+#include <map>
+#include <set>
 #include <string>
 #include <vector>
 
@@ -109,6 +114,54 @@ TEST_F(ExportTest, ImagesAreNamedFromWhereTheFileLies) {
       ReadWholeFile(Export("openmvg", {"--images", "/data/left", "--all-frames"})));
   EXPECT_EQ(elsewhere["root_path"], "/data/left");
   EXPECT_GT(fs::file_size(Export("colmap-db")), 10000u);
+}
+
+int DifferingBits(const nlohmann::json& a, const nlohmann::json& b) {
+  int count = 0;
+  for (std::size_t k = 0; k < 8; ++k) {
+    count += std::popcount(a[k].get<std::uint32_t>() ^ b[k].get<std::uint32_t>());
+  }
+  return count;
+}
+
+TEST_F(ExportTest, StellasDescriptorsTellItsLandmarksApart) {
+  const std::string bytes = ReadWholeFile(Export("stella"));
+  const nlohmann::json map = nlohmann::json::from_msgpack(bytes.begin(), bytes.end());
+  std::map<int, nlohmann::json> first_seen;
+  std::vector<int> to_itself;
+  std::vector<int> to_another;
+  std::set<int> levels;
+  const nlohmann::json* before = nullptr;
+  for (std::size_t k = 0; k < map["keyframes"].size(); ++k) {
+    const nlohmann::json& keyframe = map["keyframes"][std::to_string(k)];
+    for (std::size_t p = 0; p < keyframe["descs"].size(); ++p) {
+      levels.insert(keyframe["undist_keypts"][p]["oct"].get<int>());
+      const int landmark = keyframe["lm_ids"][p];
+      if (landmark < 0) continue;
+      const nlohmann::json& descriptor = keyframe["descs"][p];
+      const auto [seen, is_new] = first_seen.emplace(landmark, descriptor);
+      if (!is_new) to_itself.push_back(DifferingBits(seen->second, descriptor));
+      if (before != nullptr) to_another.push_back(DifferingBits(*before, descriptor));
+      before = &descriptor;
+    }
+  }
+  ASSERT_GT(to_itself.size(), 500u);
+  const auto median = [](std::vector<int>& values) {
+    std::nth_element(values.begin(), values.begin() + values.size() / 2, values.end());
+    return values[values.size() / 2];
+  };
+  EXPECT_LT(median(to_itself), 40);  // of 256; ORB-SLAM takes up to 50 for the same
+  EXPECT_GT(median(to_another), 90);
+  EXPECT_GT(levels.size(), 3u);
+
+  const fs::path elsewhere = folder_.path() / "elsewhere";
+  fs::create_directories(elsewhere);
+  EXPECT_THAT(Refusal(Rotslam({"export",
+                               RunFolder().string(),
+                               "--to=stella",
+                               "--images=" + elsewhere.string(),
+                               "--out=" + (Out() / "map.msg").string()})),
+              HasSubstr("no such image"));
 }
 
 TEST_F(ExportTest, SaysWhatItCannotDo) {

@@ -40,6 +40,7 @@ TEST(RunMap, ReadsBackWhatItHasWritten) {
     EXPECT_EQ(read.tracks[t].track.rgb, expected.track.rgb);
     EXPECT_EQ(read.tracks[t].point_in_world, expected.point_in_world);
     EXPECT_EQ(read.tracks[t].fits, expected.fits);
+    EXPECT_EQ(read.tracks[t].levels, expected.levels);
     ASSERT_EQ(read.tracks[t].track.observations.size(), expected.track.observations.size());
     for (std::size_t k = 0; k < expected.fits.size(); ++k) {
       const Observation& seen = read.tracks[t].track.observations[k];
@@ -96,6 +97,7 @@ TEST(RunMap, KeyframesKeepTheirSightingsOnly) {
   std::size_t kept = 0;
   for (const MapTrack& entry : part.tracks) {
     EXPECT_EQ(entry.fits.size(), entry.track.observations.size());
+    EXPECT_EQ(entry.levels.size(), entry.track.observations.size());
     for (const Observation& seen : entry.track.observations) {
       EXPECT_TRUE(frames.contains(seen.frame));
     }

@@ -30,7 +30,13 @@ inline RunMap MapOfScene(const Scene& scene) {
       observation.sigma_px = 0.5;
     }
     track.rgb = {static_cast<std::uint8_t>(track.id.value % 256), 20, 255};
-    MapTrack entry{track, std::nullopt, std::vector<bool>(track.observations.size(), false)};
+    MapTrack entry{track,
+                   std::nullopt,
+                   std::vector<bool>(track.observations.size(), false),
+                   std::vector<std::uint8_t>(track.observations.size())};
+    for (std::size_t k = 0; k < entry.levels.size(); ++k) {
+      entry.levels[k] = static_cast<std::uint8_t>((track.id.value + k) % 8);
+    }
     if (track.id.value % 5 != 0) {
       entry.point_in_world = scene.true_point_in_world.at(track.id);
       entry.fits.assign(track.observations.size(), true);
