@@ -69,6 +69,10 @@ Input OpenInput(const InputFlags& flags,
   } catch (const std::runtime_error& error) {
     throw std::runtime_error(input.camera_file + ": " + error.what());
   }
+  if (!flags.rotations.empty()) {
+    input.given_rotations = ReadOrientations(flags.rotations);
+    input.rotations_file = flags.rotations;
+  }
   tell("camera: " + Describe(input.camera) + " (" + input.camera_file + ")");
   if (input.sequence->NumFrames() >= 0 && input.sequence->NumFrames() < 3) {
     throw std::runtime_error(flags.sequence + ": " + std::to_string(input.sequence->NumFrames()) +

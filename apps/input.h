@@ -1,9 +1,12 @@
 #pragma once
 
 #include <memory>
+#include <optional>
 #include <string>
+#include <vector>
 
 #include "apps/command.h"
+#include "output/orientation_file.h"
 #include "rotodom/camera/camera.h"
 #include "rotodom/loop/loop_closure.h"
 #include "rotodom/sequence/sequence.h"
@@ -21,6 +24,7 @@ struct InputFlags {
   std::optional<int> stride;
   std::optional<double> fps;
   std::optional<bool> loops;
+  std::string rotations;   // orientations from elsewhere; empty: from the images
   std::string vocabulary;  // empty: the one that comes with the program
 
   void Override(SequenceOptions& options) const;
@@ -33,6 +37,9 @@ struct Input {
   std::unique_ptr<Sequence> sequence;
   Camera camera;  // with the size of the images
   std::string camera_file;
+  // Orientations from elsewhere, and their file.
+  std::optional<std::vector<StampedRotation>> given_rotations;
+  std::string rotations_file;
 };
 
 /// The vocabulary that --vocabulary names; null when it names none. Throws std::runtime_error with
@@ -40,7 +47,8 @@ struct Input {
 std::shared_ptr<const Vocabulary> OpenVocabulary(const InputFlags& flags);
 
 /// Opens the sequence, reads its camera (`flags.camera`, else what lies with the images) and says
-/// what was understood through `tell`. Throws std::runtime_error with one clear line.
+/// what was understood through `tell`; reads `flags.rotations`, too. Throws std::runtime_error with
+/// one clear line.
 Input OpenInput(const InputFlags& flags,
                 const SequenceOptions& options,
                 const std::function<void(const std::string&)>& tell);

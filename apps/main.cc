@@ -56,6 +56,7 @@ int main(int argc, char** argv) {
     rotslam::AddRunCommand(app, action);
     rotslam::AddRotationsCommand(app, action);
     rotslam::AddSolveCommand(app, action);
+    rotslam::AddExportCommand(app, action);
     rotslam::AddAverageCommand(app, action);
     rotslam::AddEvalCommand(app, action);
     rotslam::AddSimulateCommand(app, action);

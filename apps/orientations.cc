@@ -11,6 +11,7 @@
 namespace rotslam {
 
 void InterpolateUnconnected(const Orientations& orientations, RotationMap& rotations) {
+  if (orientations.given) return;
   const auto connected = [&](FrameId frame) { return !orientations.graph.EdgesOf(frame).empty(); };
   for (auto entry = rotations.begin(); entry != rotations.end(); ++entry) {
     if (connected(entry->first)) continue;
@@ -97,6 +98,7 @@ Orientations FindOrientations(Input& input,
     }
     const LoopedEstimate estimate = odometry.AddFrame(frame->id, frame->timestamp_s, frame->image);
     orientations.timestamps_s.push_back(frame->timestamp_s);
+    orientations.image_names.push_back(frame->name);
     orientations.num_weak += estimate.report.weak;
     orientations.reports.push_back(estimate.report);
     progress.Step(frame->id.value + 1, std::to_string(estimate.report.num_inliers) + " inliers");
@@ -125,12 +127,29 @@ Orientations FindOrientations(Input& input,
   for (const auto& [frame, rotation] : orientations.cam_from_world) {
     orientations.num_predicted += orientations.graph.EdgesOf(frame).empty();
   }
+  if (input.given_rotations) {
+    orientations.given = MatchGivenRotations(input.rotations_file,
+                                             *input.given_rotations,
+                                             orientations.timestamps_s,
+                                             orientations.graph);
+    orientations.cam_from_world = orientations.given->cam_from_world;
+    orientations.covariance = orientations.given->covariance;
+  }
   InterpolateUnconnected(orientations, orientations.cam_from_world);
   orientations.inlier_edges =
       CountInlierEdges(orientations.graph, orientations.cam_from_world, options.rotodom.averaging);
-  orientations.breaks = FindBreaks(orientations.graph, orientations.cam_from_world);
+  if (!orientations.given) {
+    orientations.breaks = FindBreaks(orientations.graph, orientations.cam_from_world);
+  }
   progress.EndStage(std::to_string(num_frames) + " frames, " +
                     std::to_string(orientations.graph.edges().size()) + " edges");
+  if (orientations.given) {
+    progress.Say("orientations from " + orientations.given->file + ", " +
+                 std::to_string(orientations.given->disagreement_deg) +
+                 " deg from the edges (median)");
+    WarnOfTurnScale(orientations.loops, progress);
+    return orientations;
+  }
   // The unreadable ones have had their warning.
   if (const int count = orientations.num_predicted - orientations.num_unreadable; count > 0) {
     progress.Warn(std::to_string(count) +
@@ -177,7 +196,11 @@ std::vector<RotationRow> RotationRows(const Orientations& orientations) {
       row.sigma_deg = known->second.diagonal().cwiseSqrt() * kDegFromRad;
     }
     const FrameReport& report = orientations.reports[frame.value];
-    if (orientations.graph.EdgesOf(frame).empty()) row.flags.emplace_back("predicted");
+    if (orientations.given) {
+      row.flags.emplace_back("given");
+    } else if (orientations.graph.EdgesOf(frame).empty()) {
+      row.flags.emplace_back("predicted");
+    }
     if (report.weak) row.flags.emplace_back("weak");
     if (report.searched_wide) row.flags.emplace_back("searched_wide");
     if (std::binary_search(orientations.breaks.begin(), orientations.breaks.end(), frame)) {

@@ -1,8 +1,11 @@
 #pragma once
 
 #include <map>
+#include <optional>
+#include <string>
 #include <vector>
 
+#include "apps/given_rotations.h"
 #include "apps/input.h"
 #include "apps/pipeline.h"
 #include "apps/progress.h"
@@ -15,9 +18,12 @@ namespace rotslam {
 
 /// What the first stage knows once the sequence has been read.
 struct Orientations : OdometryResult {
-  std::vector<double> timestamps_s;  // by frame id
+  std::vector<double> timestamps_s;      // by frame id
+  std::vector<std::string> image_names;  // by frame id
+  // Set: `cam_from_world` and `covariance` are these, and only the edges are the images'.
+  std::optional<GivenRotations> given;
   int num_unreadable = 0;
-  int num_predicted = 0;  // frames without an edge; their orientations are interpolated
+  int num_predicted = 0;  // frames without an edge; their orientations are interpolated, or given
   int num_weak = 0;
   // Frames that match later frames but none before them: a new piece of the view-graph, whose turn
   // against the piece before is extrapolated.
@@ -34,6 +40,8 @@ struct Orientations : OdometryResult {
 /// Reads the sequence to its end and finds every frame's orientation. Frames that could not be
 /// matched get theirs by interpolation in time between the nearest frames that could. Throws
 /// std::runtime_error when there are fewer than three frames or no two of them match.
+/// @param input       with `given_rotations`, these replace what the images say (see
+///                    MatchGivenRotations, which says what it throws).
 /// @param vocabulary  null for the one that comes with the program.
 Orientations FindOrientations(Input& input,
                               const PipelineOptions& options,
@@ -43,7 +51,7 @@ Orientations FindOrientations(Input& input,
                               Progress& progress);
 
 /// Gives the frames without an edge the orientation between those of the nearest frames in time
-/// that have one; again once these have been refined.
+/// that have one; again once these have been refined. Given orientations stay.
 void InterpolateUnconnected(const Orientations& orientations, RotationMap& cam_from_world);
 
 /// Standard deviation of every orientation whose covariance is known, rad: the root of the mean
@@ -54,8 +62,9 @@ std::map<FrameId, double> OrientationSigmas(const Orientations& orientations);
 Trajectory RotationTrajectory(const Orientations& orientations);
 
 /// The lines of rotations.csv. Flags: `predicted` (matches no other frame, interpolated), `weak`
-/// (its best edge has fewer inliers than asked for), `searched_wide` (the prediction did not guide
-/// the matching), `break` (matches none before it), `loop` (sees a place that was seen before).
+/// (its best edge has fewer inliers than asked for), `given` (from elsewhere), `searched_wide` (the
+/// prediction did not guide the matching), `break` (matches none before it), `loop` (sees a place
+/// that was seen before).
 std::vector<RotationRow> RotationRows(const Orientations& orientations);
 
 /// The lines of loops.csv.

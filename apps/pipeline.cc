@@ -18,6 +18,7 @@ std::optional<std::string> PipelineOptions::Problem() const {
   if (!(cloud_min_angle_deg >= 0.0)) {
     return OutOfRange("cloud_min_angle_deg", cloud_min_angle_deg, "zero or more");
   }
+  if (auto problem = ProblemIn("cloud_outliers", cloud_outliers)) return problem;
   return std::nullopt;
 }
 

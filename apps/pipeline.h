@@ -9,6 +9,7 @@
 #include "ba/resection.h"
 #include "krot/held_stretches.h"
 #include "krot/known_rotation.h"
+#include "output/cloud_outliers.h"
 #include "rotodom/loop/loop_closure.h"
 #include "rotodom/odometry.h"
 #include "rotodom/sequence/sequence.h"
@@ -28,6 +29,7 @@ struct PipelineOptions {
   ResectionOptions resection;
   // Points whose rays meet at less than this stay out of the cloud: their depth is noise.
   double cloud_min_angle_deg = 2.0;
+  CloudOutlierOptions cloud_outliers;
 
   std::optional<std::string> Problem() const;
 
@@ -42,6 +44,7 @@ struct PipelineOptions {
     visit("ba", ba);
     visit("resection", resection);
     visit("cloud_min_angle_deg", cloud_min_angle_deg);
+    visit("cloud_outliers", cloud_outliers);
   }
 };
 

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <iterator>
 
+#include "output/cloud_outliers.h"
 #include "rotodom/types/parallel.h"
 
 namespace rotslam {
@@ -319,7 +320,12 @@ PositionResult FindPositions(const Orientations& orientations,
   progress.StartStage("cloud", -1);
   result.cloud = WithoutShallowPoints(
       MakeCloudOf(result, all_tracks, result.camera, bundle_options), options.cloud_min_angle_deg);
-  progress.EndStage(std::to_string(result.cloud.point_in_world.size()) + " points");
+  const PointMap rest = WithoutOutliers(result.cloud.point_in_world, options.cloud_outliers);
+  result.num_cloud_outliers = static_cast<int>(result.cloud.point_in_world.size() - rest.size());
+  result.cloud.point_in_world = rest;
+  std::erase_if(result.cloud.tracks, [&](const Track& track) { return !rest.contains(track.id); });
+  progress.EndStage(std::to_string(rest.size()) + " points, " +
+                    std::to_string(result.num_cloud_outliers) + " stood alone and went");
   return result;
 }
 

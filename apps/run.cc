@@ -21,6 +21,7 @@ struct RunFlags {
   CommonFlags common;
   InputFlags input;
   KrotFlags krot;
+  bool ascii = false;
 };
 
 double SecondsSince(Clock::time_point start) {
@@ -45,8 +46,13 @@ int Run(const RunFlags& flags) {
   const PositionResult positions =
       FindPositions(orientations, input.camera, options, flags.common.NumThreads(), progress);
   const double positions_s = SecondsSince(start) - orientations_s;
-  WritePositions(directory, orientations, positions, positions.camera);
+  WritePositions(directory,
+                 orientations,
+                 positions,
+                 positions.camera,
+                 flags.ascii ? PlyForm::kAscii : PlyForm::kBinary);
   WriteKnownRotationInput(directory, orientations, positions, input.camera);
+  WriteMaps(directory, *input.sequence, orientations, positions, options.rotodom.features);
 
   RunSummary summary = StartSummary("run", input, orientations, DescribeOptions(options));
   AddPositions(positions, input.camera, summary);
@@ -64,12 +70,11 @@ int Run(const RunFlags& flags) {
     progress.Warn(
         "the camera never leaves its place, so there are no positions and no points to find");
   }
-  progress.Say(
-      "wrote " + directory.string() +
-      ": trajectory_tum.txt, trajectory_kitti.txt, keyframes_tum.txt, "
-      "rotations_tum.txt, rotations.csv, loops.csv, cloud.ply, segments.csv, view_graph.g2o, "
-      "known_rotation.txt, "
-      "summary.json");
+  progress.Say("wrote " + directory.string() +
+               ": trajectory_tum.txt, trajectory_kitti.txt, keyframes_tum.txt, "
+               "rotations_tum.txt, rotations.csv, loops.csv, cloud.ply, cameras.ply, segments.csv, "
+               "view_graph.g2o, "
+               "known_rotation.txt, map.bin, map_all_frames.bin, summary.json");
   if (positions.failure.empty()) return 0;
   throw std::runtime_error("orientations are in " + directory.string() +
                            ", positions are not: " + positions.failure);
@@ -83,6 +88,12 @@ void AddRunCommand(CLI::App& app, Action& action) {
       "run", "The whole chain: a sequence goes in, a trajectory and a point cloud come out");
   AddInputFlags(*command, flags->input);
   AddKrotFlags(*command, flags->krot);
+  command->add_option(
+      "--rotations",
+      flags->input.rotations,
+      "Orientations from elsewhere (a gimbal, an IMU, another SLAM), camera->world: "
+      "a TUM file or a rotations.csv; the images then give tracks and positions");
+  command->add_flag("--ascii", flags->ascii, "Write the PLY files as text");
   AddCommonFlags(*command, flags->common);
   command->footer("Example: rotslam run kitti/sequences/00 --out runs/kitti00");
   command->callback([flags, &action] { action = [flags] { return Run(*flags); }; });

@@ -11,8 +11,10 @@
 #include "output/g2o.h"
 #include "output/known_rotation_file.h"
 #include "output/loops_csv.h"
+#include "output/map_keypoints.h"
 #include "output/ply.h"
 #include "output/rotations_csv.h"
+#include "output/run_map.h"
 #include "output/segments.h"
 #include "output/trajectory.h"
 
@@ -65,6 +67,27 @@ std::vector<Segment> Segments(const PositionResult& positions) {
   return segments;
 }
 
+// Looks every sighting up among its frame's features, whose keypoint it is to the last bit.
+void FindLevels(const std::map<FrameId, Features>& features, RunMap& map) {
+  for (const auto& [frame, keypoints] : ListKeypoints(map)) {
+    const auto found = features.find(frame);
+    if (found == features.end()) continue;
+    std::map<std::pair<double, double>, int> level_at;
+    for (int k = 0; k < found->second.size(); ++k) {
+      const Eigen::Vector2d& keypoint_px = found->second.keypoints_px[k];
+      level_at[{keypoint_px.x(), keypoint_px.y()}] = found->second.levels[k];
+    }
+    for (const MapKeypoint& keypoint : keypoints) {
+      MapTrack& entry = map.tracks[keypoint.track];
+      const Eigen::Vector2d& keypoint_px =
+          entry.track.observations[keypoint.observation].keypoint_px;
+      const auto level = level_at.find({keypoint_px.x(), keypoint_px.y()});
+      if (level == level_at.end()) continue;
+      entry.levels[keypoint.observation] = static_cast<std::uint8_t>(level->second);
+    }
+  }
+}
+
 }  // namespace
 
 std::filesystem::path PrepareRunDirectory(const std::string& out) {
@@ -92,7 +115,8 @@ void WriteOrientations(const std::filesystem::path& directory, const Orientation
 void WritePositions(const std::filesystem::path& directory,
                     const Orientations& orientations,
                     const PositionResult& positions,
-                    const Camera& camera) {
+                    const Camera& camera,
+                    PlyForm form) {
   const Trajectory trajectory = MakeTrajectory(
       orientations.timestamps_s, positions.cam_from_world, positions.center_in_world);
   WriteTumTrajectory(directory / "trajectory_tum.txt", trajectory);
@@ -103,7 +127,14 @@ void WritePositions(const std::filesystem::path& directory,
   WriteTumTrajectory(
       directory / "keyframes_tum.txt",
       MakeTrajectory(orientations.timestamps_s, positions.cam_from_world, keyframe_centers));
-  WritePly(directory / "cloud.ply", MakeCloud(positions.cloud, camera));
+  WritePly(directory / "cloud.ply", MakeCloud(positions.cloud, camera), form);
+  std::vector<Frustum> frusta;
+  frusta.reserve(keyframe_centers.size());
+  const double size = FrustumSize(keyframe_centers);
+  for (const auto& [frame, center] : keyframe_centers) {
+    frusta.push_back({positions.cam_from_world.at(frame), center, size});
+  }
+  WriteFrustaPly(directory / "cameras.ply", frusta, camera, form);
   WriteSegments(directory / "segments.csv", Segments(positions));
 }
 
@@ -120,6 +151,37 @@ void WriteKnownRotationInput(const std::filesystem::path& directory,
   input.sigma_rad = OrientationSigmas(orientations);
   input.tracks = positions.keyframe_tracks;
   WriteKnownRotation(directory / "known_rotation.txt", input);
+}
+
+void WriteMaps(const std::filesystem::path& directory,
+               const Sequence& sequence,
+               const Orientations& orientations,
+               const PositionResult& positions,
+               const FeatureOptions& features) {
+  RunMap map;
+  map.level_scale = features.scale_factor;
+  map.num_levels = features.num_levels;
+  map.camera = positions.camera;
+  map.image_folder = std::filesystem::absolute(sequence.image_folder()).lexically_normal().string();
+  map.is_video = sequence.kind() == SequenceKind::kVideo;
+  for (const auto& [frame, cam_from_world] : positions.cam_from_world) {
+    map.frames.push_back({frame,
+                          orientations.timestamps_s[frame.value],
+                          // Frames of a video have numbers; whoever extracts them adds the ending.
+                          orientations.image_names[frame.value] + (map.is_video ? ".png" : ""),
+                          positions.keyframes.contains(frame),
+                          cam_from_world,
+                          positions.center_in_world.at(frame)});
+  }
+  for (const RelativeRotation& edge : orientations.graph.edges()) {
+    map.edges.push_back({edge.i, edge.j, edge.num_inliers, edge.rotation_only});
+  }
+  map.tracks = JoinTracks(positions.keyframe_tracks, positions.map);
+  FindLevels(orientations.features, map);
+  WriteRunMap(directory / "map.bin", map);
+  map.tracks = JoinTracks({}, positions.cloud);
+  FindLevels(orientations.features, map);
+  WriteRunMap(directory / "map_all_frames.bin", map);
 }
 
 RunSummary StartSummary(const std::string& command,
@@ -155,6 +217,10 @@ RunSummary StartSummary(const std::string& command,
   summary.rotodom = SummaryTable{
       {"mean_inliers_per_edge", inliers / static_cast<double>(orientations.graph.edges().size())},
       {"rotation_only_edges", rotation_only}};
+  if (orientations.given) {
+    summary.sequence.emplace_back("rotations_file", orientations.given->file);
+    summary.rotodom->emplace_back("given_disagreement_deg", orientations.given->disagreement_deg);
+  }
   const OdometrySeconds& seconds = orientations.seconds;
   summary.seconds = {{"pyramid", seconds.pyramid},
                      {"tracking", seconds.tracking},
@@ -181,6 +247,7 @@ void AddPositions(const PositionResult& positions, const Camera& camera, RunSumm
   summary.counts.push_back({"keyframes", count(positions.keyframes.size())});
   summary.counts.push_back({"map_points", count(positions.map.point_in_world.size())});
   summary.counts.push_back({"points", count(positions.cloud.point_in_world.size())});
+  summary.counts.push_back({"cloud_outliers", std::int64_t{positions.num_cloud_outliers}});
   summary.counts.push_back({"components", count(positions.components.size())});
   summary.counts.push_back({"resected_frames", std::int64_t{positions.num_resected}});
   summary.counts.push_back({"interpolated_frames", std::int64_t{positions.num_interpolated}});

@@ -4,6 +4,7 @@
 
 #include "apps/orientations.h"
 #include "apps/positions.h"
+#include "output/ply.h"
 #include "output/summary.h"
 
 namespace rotslam {
@@ -15,17 +16,28 @@ std::filesystem::path PrepareRunDirectory(const std::string& out);
 /// rotations_tum.txt, rotations.csv and view_graph.g2o.
 void WriteOrientations(const std::filesystem::path& directory, const Orientations& orientations);
 
-/// trajectory_tum.txt, trajectory_kitti.txt, keyframes_tum.txt, cloud.ply and segments.csv.
+/// trajectory_tum.txt, trajectory_kitti.txt, keyframes_tum.txt, cloud.ply, cameras.ply and
+/// segments.csv.
 void WritePositions(const std::filesystem::path& directory,
                     const Orientations& orientations,
                     const PositionResult& positions,
-                    const Camera& camera);
+                    const Camera& camera,
+                    PlyForm form);
 
 /// known_rotation.txt: the keyframes' orientations and tracks, which `rotslam solve` reads.
 void WriteKnownRotationInput(const std::filesystem::path& directory,
                              const Orientations& orientations,
                              const PositionResult& positions,
                              const Camera& camera);
+
+/// map.bin, the keyframes' map with all their tracks, and map_all_frames.bin, the cloud as all
+/// frames see it: what `rotslam export` reads.
+/// @param features  with which the orientations were found.
+void WriteMaps(const std::filesystem::path& directory,
+               const Sequence& sequence,
+               const Orientations& orientations,
+               const PositionResult& positions,
+               const FeatureOptions& features);
 
 /// The parts of summary.json that `run` and `rotations` share.
 RunSummary StartSummary(const std::string& command,

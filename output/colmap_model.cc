@@ -4,7 +4,6 @@
 #include <array>
 #include <cmath>
 #include <cstdint>
-#include <cstring>
 #include <fstream>
 #include <iterator>
 #include <limits>
@@ -15,6 +14,7 @@
 #include <utility>
 #include <vector>
 
+#include "output/binary_file.h"
 #include "output/text_file.h"
 #include "rotodom/camera/read_camera.h"
 
@@ -138,47 +138,6 @@ class ModelBuilder {
   std::set<std::uint64_t> points_;
 };
 
-// Little-endian numbers of a file in memory, as x86 and ARM have them.
-class Bytes {
- public:
-  explicit Bytes(const fs::path& file) : file_(file), bytes_(ReadAll(file)) {}
-
-  template <class T>
-  T Get() {
-    if (bytes_.size() - at_ < sizeof(T)) Fail(file_, "is cut short");
-    T value;
-    std::memcpy(&value, bytes_.data() + at_, sizeof(T));
-    at_ += sizeof(T);
-    return value;
-  }
-  // A count of things to come, each of at least so many bytes.
-  std::uint64_t Count(const char* what, std::uint64_t bytes_each) {
-    const auto count = Get<std::uint64_t>();
-    if (count > (bytes_.size() - at_) / bytes_each) {
-      Fail(file_,
-           "says " + std::to_string(count) + " " + what + ", but has only " +
-               std::to_string(bytes_.size() - at_) + " bytes more");
-    }
-    return count;
-  }
-  std::string Name() {
-    const std::size_t end = bytes_.find('\0', at_);
-    if (end == std::string::npos) Fail(file_, "is cut short");
-    std::string name = bytes_.substr(at_, end - at_);
-    at_ = end + 1;
-    return name;
-  }
-  void ExpectEnd() const {
-    if (at_ != bytes_.size()) Fail(file_, "is longer than its counts say");
-  }
-  const fs::path& file() const { return file_; }
-
- private:
-  fs::path file_;
-  std::string bytes_;
-  std::size_t at_ = 0;
-};
-
 struct BinaryModel {
   int id;
   const char* name;
@@ -195,7 +154,7 @@ constexpr std::array<BinaryModel, 9> kBinaryModels = {{{0, "SIMPLE_PINHOLE", 3},
                                                        {9, "RADIAL_FISHEYE", 5}}};
 
 void ReadBinaryCameras(const fs::path& file, ModelBuilder& builder) {
-  Bytes bytes(file);
+  BinaryReader bytes(file);
   for (auto left = bytes.Count("cameras", 24); left > 0; --left) {
     const std::string id = std::to_string(bytes.Get<std::uint32_t>());
     const int model_id = bytes.Get<std::int32_t>();
@@ -219,7 +178,7 @@ void ReadBinaryCameras(const fs::path& file, ModelBuilder& builder) {
 }
 
 void ReadBinaryImages(const fs::path& file, ModelBuilder& builder) {
-  Bytes bytes(file);
+  BinaryReader bytes(file);
   for (auto left = bytes.Count("images", 73); left > 0; --left) {
     const auto id = bytes.Get<std::uint32_t>();
     std::array<double, 7> pose;
@@ -241,7 +200,7 @@ void ReadBinaryImages(const fs::path& file, ModelBuilder& builder) {
 }
 
 void ReadBinaryPoints(const fs::path& file, ModelBuilder& builder) {
-  Bytes bytes(file);
+  BinaryReader bytes(file);
   for (auto left = bytes.Count("points", 51); left > 0; --left) {
     PointTrack point;
     point.id = bytes.Get<std::uint64_t>();

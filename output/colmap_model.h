@@ -3,7 +3,9 @@
 #include <filesystem>
 #include <map>
 #include <string>
+#include <vector>
 
+#include "output/run_map.h"
 #include "rotodom/camera/camera.h"
 #include "rotodom/types/reconstruction.h"
 
@@ -24,5 +26,28 @@ struct ColmapModel {
 /// the file's size, ids that do not exist or are there twice, numbers that are not finite, a camera
 /// model not known.
 ColmapModel ReadColmapModel(const std::filesystem::path& folder);
+
+/// A camera as COLMAP has it: kPinhole is PINHOLE, kRadtan OPENCV, or FULL_OPENCV where k3 is not
+/// zero, kEquidistant OPENCV_FISHEYE; the principal point gains 0.5.
+struct ColmapCamera {
+  int model_id = 0;
+  std::string model;
+  std::vector<double> parameters;
+};
+ColmapCamera ToColmap(const Camera& camera);
+
+/// Ids in COLMAP's files and database: they start from 1.
+inline int ColmapImageId(FrameId frame) { return frame.value + 1; }
+inline int ColmapPointId(TrackId track) { return track.value + 1; }
+
+enum class ColmapForm { kBinary, kText };
+
+/// Writes `cameras`, `images` and `points3D`, as .bin or .txt, into a folder, made where missing;
+/// files of the other form are taken away, since readers would prefer one of them. Poses are
+/// world->camera, quaternions w first. The keypoints of an image are all its sightings in the
+/// order of ListKeypoints; those without a point are there, too, so that a database can have the
+/// same. Text has 17 digits, so both read back the same.
+/// Throws std::runtime_error when a file cannot be written.
+void WriteColmapModel(const std::filesystem::path& folder, const RunMap& map, ColmapForm form);
 
 }  // namespace rotslam

@@ -14,6 +14,9 @@
 namespace rotslam {
 namespace {
 
+// As many digits as tell one float from the next.
+constexpr int kTextDigits = 9;
+
 // A point as it lies in memory; PCL writes colour packed into one word as three bytes.
 struct PackedPoint {
   float x;
@@ -78,24 +81,34 @@ pcl::PCLPointCloud2 PackCloud(const std::vector<CloudPoint>& cloud) {
 
 }  // namespace
 
-void WritePly(const std::filesystem::path& path, const std::vector<CloudPoint>& cloud) {
+void WritePly(const std::filesystem::path& path,
+              const std::vector<CloudPoint>& cloud,
+              PlyForm form) {
   const pcl::PCLPointCloud2 packed = PackCloud(cloud);
   const Eigen::Vector4f origin = Eigen::Vector4f::Zero();
   const Eigen::Quaternionf orientation = Eigen::Quaternionf::Identity();
+  const bool is_text = form == PlyForm::kAscii;
   pcl::PLYWriter writer;
   if (cloud.empty()) {  // which PCL's writer refuses
-    ReplaceFile(path, writer.generateHeaderBinary(packed, origin, orientation, 0, false));
+    ReplaceFile(path,
+                is_text ? writer.generateHeaderASCII(packed, origin, orientation, 0, false)
+                        : writer.generateHeaderBinary(packed, origin, orientation, 0, false));
     return;
   }
   ReplaceFile(path, [&](const std::filesystem::path& temporary) {
     // PCL does not say why a file cannot be opened: find out first.
     ReplaceFile(temporary, std::string_view());
     const int status =
-        writer.writeBinary(temporary.string(), packed, origin, orientation, /*use_camera=*/false);
+        is_text
+            ? writer.writeASCII(temporary.string(), packed, origin, orientation, kTextDigits, false)
+            : writer.writeBinary(
+                  temporary.string(), packed, origin, orientation, /*use_camera=*/false);
     std::error_code error;
     const auto size = std::filesystem::file_size(temporary, error);
-    // PCL drops one byte per point, the unused one of the colour; a full disk shows as less.
-    if (status != 0 || error || size <= cloud.size() * (sizeof(PackedPoint) - 1)) {
+    // PCL drops one byte per point, the unused one of the colour; a full disk shows as less. Text
+    // has at least a digit and a blank per number.
+    const std::uintmax_t least = is_text ? 2 * 11 : sizeof(PackedPoint) - 1;
+    if (status != 0 || error || size <= cloud.size() * least) {
       throw std::runtime_error(path.string() + ": cannot write the cloud: is the disk full?");
     }
   });

@@ -28,9 +28,32 @@ struct CloudPoint {
 /// Throws std::invalid_argument when `camera.Problem()` says so.
 std::vector<CloudPoint> MakeCloud(const Reconstruction& reconstruction, const Camera& camera);
 
-/// Writes a binary little-endian PLY through PCL: float x y z, uchar red green blue, float nx ny
-/// nz, int observations, float error_px. An empty cloud is a valid file. Throws std::runtime_error
-/// when the file cannot be written.
-void WritePly(const std::filesystem::path& path, const std::vector<CloudPoint>& cloud);
+enum class PlyForm { kBinary, kAscii };
+
+/// Writes a PLY through PCL, binary little-endian or text: float x y z, uchar red green blue, float
+/// nx ny nz, int observations, float error_px. An empty cloud is a valid file. Throws
+/// std::runtime_error when the file cannot be written.
+void WritePly(const std::filesystem::path& path,
+              const std::vector<CloudPoint>& cloud,
+              PlyForm form = PlyForm::kBinary);
+
+/// One camera as a pyramid: its centre and the corners of its image at `size` from it.
+struct Frustum {
+  Rotation cam_from_world;
+  Eigen::Vector3d center_in_world = Eigen::Vector3d::Zero();
+  double size = 1.0;
+};
+
+/// Half the median distance between neighbours that do not share a place; 1 without any.
+double FrustumSize(const CenterMap& centers);
+
+/// Writes cameras as a PLY mesh, every viewer's way to show lines and faces: five vertices (centre,
+/// then the corners clockwise from the top left) and four triangles each, coloured from blue to red
+/// in their order. Throws std::invalid_argument when `camera.Problem()`, std::runtime_error when
+/// the file cannot be written.
+void WriteFrustaPly(const std::filesystem::path& path,
+                    const std::vector<Frustum>& frusta,
+                    const Camera& camera,
+                    PlyForm form = PlyForm::kBinary);
 
 }  // namespace rotslam

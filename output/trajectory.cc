@@ -126,4 +126,19 @@ void WriteKittiTrajectory(const std::filesystem::path& path, const Trajectory& t
   ReplaceFile(path, text);
 }
 
+void WriteEurocTrajectory(const std::filesystem::path& path, const Trajectory& trajectory) {
+  RequireFinite(trajectory);
+  std::string text = "#timestamp [ns],p_x [m],p_y [m],p_z [m],q_w [],q_x [],q_y [],q_z []\n";
+  for (const StampedPose& pose : trajectory) {
+    text += std::to_string(std::llround(1e9 * pose.timestamp_s));
+    const Eigen::Quaterniond& q = pose.world_from_cam.Quaternion();
+    const Eigen::Vector3d& p = pose.center_in_world;
+    for (const double value : {p.x(), p.y(), p.z(), q.w(), q.x(), q.y(), q.z()}) {
+      text += FormatNumber(",%.12g", value);
+    }
+    text += '\n';
+  }
+  ReplaceFile(path, text);
+}
+
 }  // namespace rotslam

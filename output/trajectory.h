@@ -27,4 +27,8 @@ void WriteTumTrajectory(const std::filesystem::path& path, const Trajectory& tra
 /// Writes the KITTI format, 12 significant digits; timestamps are not in it. Errors as above.
 void WriteKittiTrajectory(const std::filesystem::path& path, const Trajectory& trajectory);
 
+/// Writes poses in the columns of EuRoC's ground truth: `#timestamp [ns], p x y z [m], q w x y z`,
+/// camera->world, 12 significant digits, whole nanoseconds. Errors as above.
+void WriteEurocTrajectory(const std::filesystem::path& path, const Trajectory& trajectory);
+
 }  // namespace rotslam

@@ -13,13 +13,14 @@ packages=(
   # krot and ba
   coinor-libclp-dev libceres-dev libgoogle-glog-dev
   # output and apps
-  libcli11-dev libpcl-dev nlohmann-json3-dev
+  libcli11-dev libpcl-dev libsqlite3-dev nlohmann-json3-dev
   # tests; GLPK and OpenGV to compare with, numpy for the independent check of `rotslam eval`
   libglpk-dev libgmock-dev libgtest-dev libopengv-dev python3-numpy
 )
 # Not needed: libbenchmark-dev, for the benchmarks (ROTSLAM_BUILD_BENCHMARKS).
 if [[ ${1:-} == --ci ]]; then
-  packages+=(clang-format-14 clang-tidy-14)
+  # colmap: the tests that hand it our models, which skip without it
+  packages+=(clang-format-14 clang-tidy-14 colmap)
 elif [[ $# -gt 0 ]]; then
   echo "usage: ${0##*/} [--ci]" >&2
   exit 2

@@ -161,6 +161,7 @@ class FileSequence : public Sequence {
       entries_.push_back(std::move(layout.entries[static_cast<std::size_t>(k)]));
       timestamps_s_.push_back(entries_.back().timestamp_s);
     }
+    image_folder_ = entries_.front().file.parent_path();
     num_frames_ = static_cast<int>(entries_.size());
     CheckIncreasing(entries_);
     FindImageSize();
@@ -225,7 +226,7 @@ class VideoSequence : public Sequence {
  public:
   VideoSequence(Layout layout, const SequenceOptions& options) : options_(options) {
     kind_ = SequenceKind::kVideo;
-    place_ = std::move(layout.folder);
+    place_ = image_folder_ = std::move(layout.folder);
     camera_file_ = std::move(layout.camera_file);
     Probe();
     capture_.open(place_.string(), VideoBackEnd());

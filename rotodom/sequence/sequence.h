@@ -79,6 +79,9 @@ class Sequence {
 
   SequenceKind kind() const { return kind_; }
 
+  /// Folder that Frame::name is in; for a video, the file.
+  const std::filesystem::path& image_folder() const { return image_folder_; }
+
   /// One line for people: kind, number of frames, size, duration, place.
   std::string Describe() const;
 
@@ -98,6 +101,7 @@ class Sequence {
 
   SequenceKind kind_ = SequenceKind::kImageFolder;
   std::filesystem::path place_;
+  std::filesystem::path image_folder_;
   int num_frames_ = -1;
   std::vector<double> timestamps_s_;
   cv::Size image_size_;

@@ -62,10 +62,13 @@ INSTANTIATE_TEST_SUITE_P(Run, OnBothSequences, testing::Values("gimbal", "handhe
 
 TEST_P(OnBothSequences, WritesItsFilesAndNoOthers) {
   EXPECT_THAT(FileNames(Out()),
-              ElementsAre("cloud.ply",
+              ElementsAre("cameras.ply",
+                          "cloud.ply",
                           "keyframes_tum.txt",
                           "known_rotation.txt",
                           "loops.csv",
+                          "map.bin",
+                          "map_all_frames.bin",
                           "rotations.csv",
                           "rotations_tum.txt",
                           "segments.csv",

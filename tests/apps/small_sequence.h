@@ -92,10 +92,13 @@ class SmallSequenceTest : public testing::Test {
     EXPECT_EQ(result.output, "");
     EXPECT_THAT(Lines(result.error), testing::Each(testing::StartsWith("rotslam: warning: ")));
     EXPECT_THAT(FileNames(Out()),
-                testing::ElementsAre("cloud.ply",
+                testing::ElementsAre("cameras.ply",
+                                     "cloud.ply",
                                      "keyframes_tum.txt",
                                      "known_rotation.txt",
                                      "loops.csv",
+                                     "map.bin",
+                                     "map_all_frames.bin",
                                      "rotations.csv",
                                      "rotations_tum.txt",
                                      "segments.csv",

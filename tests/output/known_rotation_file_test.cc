@@ -2,6 +2,7 @@
 
 #include <filesystem>
 #include <fstream>
+#include <limits>
 #include <string>
 #include <vector>
 
@@ -185,6 +186,15 @@ TEST(KnownRotationFile, SaysWhatIsWrongWithColmapModels) {
   EXPECT_THAT(text_with("points3D.txt", "1 0 0 0 1 2 3 0\n1 0 0 0 1 2 3 0\n"),
               HasSubstr("point 1 is there twice"));
 
+  for (const char* name : {"cameras.txt", "images.txt", "points3D.txt"}) {
+    WriteColmapText(text, scene);
+    fs::remove(text / name);
+    EXPECT_THAT(
+        RuntimeErrorOf([&] { ReadKnownRotation(text); }),
+        HasSubstr(std::string(name) == "images.txt" ? "neither known_rotation.txt"
+                                                    : std::string(name) + ": no such file"));
+  }
+
   // A binary model cut anywhere is refused, and never believed about its counts.
   const fs::path binary = folder.path() / "binary";
   for (const char* name : {"cameras.bin", "images.bin", "points3D.bin"}) {
@@ -202,6 +212,22 @@ TEST(KnownRotationFile, SaysWhatIsWrongWithColmapModels) {
     file.close();
     EXPECT_THROW(ReadKnownRotation(binary), std::runtime_error) << name;
   }
+  // Numbers in the middle of it likewise: the model of the camera, a pose, a point, a name twice.
+  const auto binary_with = [&](const char* name, std::streamoff at, auto value) {
+    WriteColmapBinary(binary, scene);
+    std::fstream file(binary / name, std::ios::binary | std::ios::in | std::ios::out);
+    file.seekp(at);
+    file.write(reinterpret_cast<const char*>(&value), sizeof(value));
+    file.close();
+    return RuntimeErrorOf([&] { ReadKnownRotation(binary); });
+  };
+  const double nan = std::numeric_limits<double>::quiet_NaN();
+  EXPECT_THAT(binary_with("cameras.bin", 12, std::int32_t{99}), HasSubstr("its model, number 99"));
+  EXPECT_THAT(binary_with("cameras.bin", 32, nan), HasSubstr("cameras.bin"));
+  EXPECT_THAT(binary_with("images.bin", 12, nan), HasSubstr("image 1: its pose is not finite"));
+  EXPECT_THAT(binary_with("images.bin", 12, 3.0), HasSubstr("quaternion is not of length 1"));
+  EXPECT_THAT(binary_with("points3D.bin", 16, nan), HasSubstr("point 1 is not finite"));
+  EXPECT_THAT(binary_with("points3D.bin", 59, std::uint32_t{77}), HasSubstr("names image 77"));
 }
 
 }  // namespace

@@ -5,6 +5,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 #include <pcl/PCLPointCloud2.h>
+#include <pcl/PolygonMesh.h>
 #include <pcl/conversions.h>
 #include <pcl/io/ply_io.h>
 #include <pcl/point_types.h>
@@ -59,7 +60,10 @@ TEST(MakeCloud, LeavesOutWhatNoCameraCanSee) {
   EXPECT_TRUE(MakeCloud(reconstruction, SomeCamera()).empty());
 }
 
-TEST(WritePly, IsReadBackByPcl) {
+class PlyForms : public testing::TestWithParam<PlyForm> {};
+INSTANTIATE_TEST_SUITE_P(WritePly, PlyForms, testing::Values(PlyForm::kBinary, PlyForm::kAscii));
+
+TEST_P(PlyForms, AreReadBackByPcl) {
   const TemporaryFolder folder;
   std::vector<CloudPoint> cloud;
   for (int k = 0; k < 1000; ++k) {
@@ -71,7 +75,7 @@ TEST(WritePly, IsReadBackByPcl) {
     point.mean_error_px = 0.25 * k;
     cloud.push_back(point);
   }
-  WritePly(folder.path() / "c.ply", cloud);
+  WritePly(folder.path() / "c.ply", cloud, GetParam());
 
   pcl::PCLPointCloud2 blob;
   ASSERT_EQ(pcl::PLYReader().read((folder.path() / "c.ply").string(), blob), 0);
@@ -115,12 +119,67 @@ TEST(WritePly, HasThePropertiesEveryViewerKnows) {
   EXPECT_THAT(text, testing::Not(HasSubstr("alpha")));
 }
 
+TEST(WritePly, AsciiIsText) {
+  const TemporaryFolder folder;
+  WritePly(folder.path() / "c.ply", {CloudPoint{}}, PlyForm::kAscii);
+  const std::string text = ReadWholeFile(folder.path() / "c.ply");
+  EXPECT_THAT(text, HasSubstr("format ascii 1.0\n"));
+  EXPECT_THAT(text, HasSubstr("end_header\n0 0 0 128 128 128 0 0 0 0 0\n"));
+  WritePly(folder.path() / "c.ply", {}, PlyForm::kAscii);
+  EXPECT_THAT(ReadWholeFile(folder.path() / "c.ply"), HasSubstr("element vertex 0"));
+}
+
 TEST(WritePly, TakesAnEmptyCloudAndRefusesAMissingFolder) {
   const TemporaryFolder folder;
   WritePly(folder.path() / "c.ply", {});
   EXPECT_THAT(ReadWholeFile(folder.path() / "c.ply"), HasSubstr("element vertex 0"));
   EXPECT_THAT(RuntimeErrorOf([&] { WritePly(folder.path() / "no" / "c.ply", {}); }),
               HasSubstr("No such file or directory"));
+}
+
+TEST_P(PlyForms, FrustaAreReadBackByPcl) {
+  const TemporaryFolder folder;
+  const Rotation cam_from_world = Rotation::Exp({0.1, -0.7, 0.3});
+  const Eigen::Vector3d center(4.0, -5.0, 6.0);
+  WriteFrustaPly(folder.path() / "cameras.ply",
+                 {{cam_from_world, center, 0.25}, {Rotation(), Eigen::Vector3d::Zero(), 1.0}},
+                 SomeCamera(),
+                 GetParam());
+  pcl::PolygonMesh mesh;
+  ASSERT_EQ(pcl::PLYReader().read((folder.path() / "cameras.ply").string(), mesh), 0);
+  pcl::PointCloud<pcl::PointXYZRGB> vertices;
+  pcl::fromPCLPointCloud2(mesh.cloud, vertices);
+  ASSERT_EQ(vertices.size(), 10u);
+  ASSERT_EQ(mesh.polygons.size(), 8u);
+  EXPECT_EQ(vertices[0].getVector3fMap(), center.cast<float>());
+  for (int corner = 1; corner < 5; ++corner) {
+    const Eigen::Vector3d ray =
+        cam_from_world * (vertices[corner].getVector3fMap().cast<double>() - center);
+    EXPECT_NEAR(ray.norm(), 0.25, 1e-6);
+    const Eigen::Vector2d pixel = SomeCamera().Project(ray).value();
+    EXPECT_NEAR(pixel.x(), corner == 2 || corner == 3 ? 639.5 : -0.5, 1e-2);
+    EXPECT_NEAR(pixel.y(), corner >= 3 ? 479.5 : -0.5, 1e-2);
+  }
+  for (std::size_t face = 0; face < mesh.polygons.size(); ++face) {
+    ASSERT_EQ(mesh.polygons[face].vertices.size(), 3u);
+    EXPECT_EQ(mesh.polygons[face].vertices[0], face < 4 ? 0u : 5u);
+  }
+  EXPECT_EQ(vertices[0].b, 255);
+  EXPECT_EQ(vertices[5].r, 255);
+}
+
+TEST(WriteFrustaPly, TakesNoCamerasAndRefusesBrokenOnes) {
+  const TemporaryFolder folder;
+  WriteFrustaPly(folder.path() / "cameras.ply", {}, SomeCamera());
+  EXPECT_THAT(ReadWholeFile(folder.path() / "cameras.ply"), HasSubstr("element face 0"));
+  EXPECT_THROW(WriteFrustaPly(folder.path() / "cameras.ply", {}, Camera{}), std::invalid_argument);
+}
+
+TEST(FrustumSize, IsHalfAStepAndForgetsWhereTheCameraStands) {
+  EXPECT_EQ(FrustumSize({}), 1.0);
+  CenterMap centers;
+  for (int k = 0; k < 20; ++k) centers[FrameId{k}] = Eigen::Vector3d(3.0 * std::min(k, 7), 0, 0);
+  EXPECT_EQ(FrustumSize(centers), 1.5);
 }
 
 }  // namespace
