@@ -8,37 +8,17 @@
 #include <tuple>
 #include <utility>
 
+#include "krot/component_start.h"
 #include "krot/components.h"
 #include "krot/epipolar_filter.h"
 #include "krot/growth.h"
 #include "krot/minimax_problem.h"
+#include "krot/named_problem.h"
 #include "krot/robust_triangulation.h"
-#include "krot/selection.h"
-#include "rotodom/types/options.h"
 #include "rotodom/types/parallel.h"
 
 namespace rotslam {
 namespace {
-
-// Options in the units the stages use.
-struct Units {
-  double focal_px;
-  double gamma;            // threshold_px, normalised
-  double still_rad;        // still_parallax_px
-  double lp_parallax_rad;  // min_lp_parallax_deg
-  double point_angle_rad;  // min_point_angle_deg
-  double loose_rad;        // loose_factor * threshold_px
-};
-
-Units InUnits(const KrotOptions& options, const Camera& camera) {
-  const double focal_px = camera.MeanFocal();
-  return {focal_px,
-          options.threshold_px / focal_px,
-          options.still_parallax_px / focal_px,
-          options.min_lp_parallax_deg * kRadFromDeg,
-          options.min_point_angle_deg * kRadFromDeg,
-          options.loose_factor * options.threshold_px / focal_px};
-}
 
 // The linear programs have one bound for all: that of the median track.
 double MedianOf(std::vector<double> values, double if_none) {
@@ -48,7 +28,7 @@ double MedianOf(std::vector<double> values, double if_none) {
   return *middle;
 }
 
-Units WithThreshold(Units units, double gamma, const KrotOptions& options) {
+KrotUnits WithThreshold(KrotUnits units, double gamma, const KrotOptions& options) {
   units.gamma = gamma;
   units.loose_rad = options.loose_factor * gamma;
   return units;
@@ -59,7 +39,7 @@ Units WithThreshold(Units units, double gamma, const KrotOptions& options) {
 std::vector<double> TrackThresholds(const std::vector<Track>& tracks,
                                     const std::map<FrameId, double>& sigma_rad,
                                     const KrotOptions& options,
-                                    const Units& units) {
+                                    const KrotUnits& units) {
   std::vector<double> thresholds;
   thresholds.reserve(tracks.size());
   for (const Track& track : tracks) {
@@ -129,7 +109,7 @@ std::vector<Track> CleanTracks(const std::vector<Track>& tracks, KrotSolution& s
 
 void RemoveEpipolarOutliers(const RotationMap& cam_from_world,
                             const KrotOptions& options,
-                            const Units& units,
+                            const KrotUnits& units,
                             std::vector<Track>& tracks,
                             KrotSolution& solution) {
   EpipolarFilterOptions filter;
@@ -146,147 +126,20 @@ void RemoveEpipolarOutliers(const RotationMap& cam_from_world,
   }
 }
 
-// Tracks cut to the observations that fulfil `keep`; those left with fewer than two are dropped.
-template <class Keep>
-std::vector<Track> Restricted(const std::vector<Track>& tracks, const Keep& keep) {
-  std::vector<Track> result;
-  for (const Track& track : tracks) {
-    Track part;
-    part.id = track.id;
-    for (const Observation& observation : track.observations) {
-      if (keep(observation)) part.observations.push_back(observation);
-    }
-    if (part.observations.size() >= 2) result.push_back(std::move(part));
-  }
-  return result;
-}
-
-// A MinimaxProblem with the names of its views and points.
-struct NamedProblem {
-  MinimaxProblem problem;
-  std::vector<FrameId> views;
-  std::vector<int> tracks;  // positions in the list it was made of
-};
-
-NamedProblem MakeProblem(const RotationMap& cam_from_world,
-                         const std::vector<Track>& tracks,
-                         const std::vector<int>& selection) {
-  NamedProblem named;
-  std::map<FrameId, int> view_of;
-  for (const int t : selection) {
-    for (const Observation& observation : tracks[t].observations) view_of[observation.frame] = 0;
-  }
-  for (auto& [frame, view] : view_of) {
-    view = named.problem.num_views();
-    named.views.push_back(frame);
-    named.problem.R_c_w.push_back(cam_from_world.at(frame).Matrix());
-  }
-  for (const int t : selection) {
-    for (const Observation& observation : tracks[t].observations) {
-      named.problem.observations.push_back(
-          {view_of.at(observation.frame),
-           named.problem.num_points,
-           observation.bearing.head<2>() / observation.bearing.z()});
-    }
-    ++named.problem.num_points;
-    named.tracks.push_back(t);
-  }
-  return named;
-}
-
-// The observations of `problem` with residual at most `limit`, without points then seen once, and
-// the structure cut alike. Every view stays, so the gauge does.
-std::pair<MinimaxProblem, MinimaxStructure> Survivors(const MinimaxProblem& problem,
-                                                      const RobustStart& start,
-                                                      double limit) {
-  std::vector<int> count(problem.num_points, 0);
-  for (std::size_t o = 0; o < problem.observations.size(); ++o) {
-    if (start.residuals[o] <= limit) ++count[problem.observations[o].point];
-  }
-  MinimaxProblem survivors;
-  survivors.R_c_w = problem.R_c_w;
-  MinimaxStructure structure;
-  structure.center_in_world = start.structure.center_in_world;
-  std::vector<int> new_point(problem.num_points, -1);
-  for (int i = 0; i < problem.num_points; ++i) {
-    if (count[i] < 2) continue;
-    new_point[i] = survivors.num_points++;
-    structure.point_in_world.push_back(start.structure.point_in_world[i]);
-  }
-  for (std::size_t o = 0; o < problem.observations.size(); ++o) {
-    ImageObservation observation = problem.observations[o];
-    if (start.residuals[o] > limit || new_point[observation.point] < 0) continue;
-    observation.point = new_point[observation.point];
-    survivors.observations.push_back(observation);
-  }
-  return {std::move(survivors), std::move(structure)};
-}
-
-// What one component's linear programs gave.
-struct ComponentStart {
-  bool solved = false;
-  bool bracket_converged = false;
-  CenterMap centers;
-};
-
-ComponentStart SolvePrograms(const RotationMap& cam_from_world,
-                             const std::vector<Track>& lp_tracks,
-                             const KrotOptions& options,
-                             const Units& units,
-                             KrotSolution& solution) {
-  SelectionOptions selection;
-  selection.observations_per_view = options.observations_per_view;
-  selection.min_parallax_rad = units.lp_parallax_rad;
-  const NamedProblem named =
-      MakeProblem(cam_from_world, lp_tracks, SelectTracks(cam_from_world, lp_tracks, selection));
-  ComponentStart result;
-  if (named.problem.num_views() < 2) return result;
-  const RobustStart start = SolveRobustStart(named.problem, units.gamma, options.robust_start);
-  solution.num_programs += start.num_programs;
-  if (start.call != LpCallStatus::kCompleted) return result;
-  auto [survivors, structure] = Survivors(named.problem, start, 1.001 * units.gamma);
-  if (survivors.observations.empty()) return result;
-
-  double low = 0.0;
-  double high = MaxBoxResidual(survivors, structure);
-  if (options.use_bracket && named.problem.num_views() <= options.max_bracket_views) {
-    BisectionResult bracket = MinimiseMaxResidual(survivors, options.bisection, &structure);
-    solution.num_programs += bracket.num_programs;
-    low = bracket.gamma_low;
-    high = bracket.gamma_high;
-    result.bracket_converged = bracket.status == BisectionStatus::kConverged;
-    if (options.start == "bisection") structure = std::move(bracket.structure);
-  }
-  solution.gamma_low = std::max(solution.gamma_low, low);
-  solution.gamma_high =
-      solution.gamma_high == kInfinity ? high : std::max(solution.gamma_high, high);
-  solution.num_bracket_observations += static_cast<int>(survivors.observations.size());
-  solution.num_bracket_tracks += survivors.num_points;
-  if (options.start == "linear") {
-    auto linear = SolveLinearStart(survivors, options.linear_start);
-    if (!linear) return result;
-    structure = *std::move(linear);
-  }
-  for (int view = 0; view < named.problem.num_views(); ++view) {
-    result.centers[named.views[view]] = structure.center_in_world[view];
-  }
-  result.solved = true;
-  return result;
-}
-
 // Points of all tracks from a component's centres, by track position; what disagrees is reported.
 struct TrackPoint {
   Eigen::Vector3d point_in_world;
   std::vector<FrameId> outliers;
 };
+using TrackPoints = std::vector<std::optional<TrackPoint>>;
 
-std::vector<std::optional<TrackPoint>> TriangulateAll(const RotationMap& cam_from_world,
-                                                      const CenterMap& centers,
-                                                      const std::vector<Track>& tracks,
-                                                      const std::vector<double>& thresholds,
-                                                      const KrotOptions& options,
-                                                      const Units& units) {
-  std::vector<std::optional<TrackPoint>> points(tracks.size());
+TrackPoints TriangulateAll(const RotationMap& cam_from_world,
+                           const CenterMap& centers,
+                           const std::vector<Track>& tracks,
+                           const std::vector<double>& thresholds,
+                           const KrotOptions& options,
+                           const KrotUnits& units) {
+  TrackPoints points(tracks.size());
   ParallelFor(static_cast<int>(tracks.size()), options.num_threads, [&](int t) {
     std::vector<int> observations;
     const std::vector<Sighting> sightings =
@@ -308,10 +161,99 @@ std::vector<std::optional<TrackPoint>> TriangulateAll(const RotationMap& cam_fro
   return points;
 }
 
+// What the triangulation kept, as the minimax problem and its structure.
+struct KeptProblem {
+  NamedProblem named;
+  MinimaxStructure structure;
+};
+
+KeptProblem TakeKept(const RotationMap& cam_from_world,
+                     const CenterMap& centers,
+                     const std::vector<Track>& tracks,
+                     const TrackPoints& points,
+                     double min_z) {
+  KeptProblem kept;
+  std::vector<Track> kept_tracks;
+  for (std::size_t t = 0; t < tracks.size(); ++t) {
+    if (!points[t]) continue;
+    const std::vector<FrameId>& outliers = points[t]->outliers;
+    Track track;
+    track.id = tracks[t].id;
+    for (const Observation& observation : tracks[t].observations) {
+      if (!centers.contains(observation.frame) || observation.bearing.z() < min_z) continue;
+      if (std::find(outliers.begin(), outliers.end(), observation.frame) != outliers.end())
+        continue;
+      track.observations.push_back(observation);
+    }
+    if (track.observations.size() < 2) continue;
+    kept_tracks.push_back(std::move(track));
+    kept.structure.point_in_world.push_back(points[t]->point_in_world);
+  }
+  kept.named = MakeProblem(cam_from_world, kept_tracks);
+  for (const FrameId view : kept.named.views) {
+    kept.structure.center_in_world.push_back(centers.at(view));
+  }
+  return kept;
+}
+
+// `centers` replaced by `better` where there are such, moved and scaled to lie on them best.
+void TakeCenters(const std::vector<FrameId>& views,
+                 const std::vector<Eigen::Vector3d>& better,
+                 CenterMap& centers) {
+  Eigen::Vector3d mean_from = Eigen::Vector3d::Zero();
+  Eigen::Vector3d mean_to = Eigen::Vector3d::Zero();
+  for (std::size_t k = 0; k < views.size(); ++k) {
+    mean_from += better[k] / static_cast<double>(views.size());
+    mean_to += centers.at(views[k]) / static_cast<double>(views.size());
+  }
+  double common = 0.0;
+  double squared = 0.0;
+  for (std::size_t k = 0; k < views.size(); ++k) {
+    common += (better[k] - mean_from).dot(centers.at(views[k]) - mean_to);
+    squared += (better[k] - mean_from).squaredNorm();
+  }
+  if (!(common > 0.0 && squared > 0.0)) return;
+  for (std::size_t k = 0; k < views.size(); ++k) {
+    centers[views[k]] = mean_to + common / squared * (better[k] - mean_from);
+  }
+}
+
+// Enters what a component's observations say about the least possible largest residual; the best
+// structure's centres become the component's where they are asked for. Returns whether the bracket
+// is as narrow as asked.
+bool BoundResidual(const RotationMap& cam_from_world,
+                   const std::vector<Track>& tracks,
+                   const TrackPoints& points,
+                   const KrotOptions& options,
+                   const KrotUnits& units,
+                   CenterMap& centers,
+                   KrotSolution& solution) {
+  const KeptProblem kept = TakeKept(cam_from_world, centers, tracks, points, units.min_z);
+  const MinimaxProblem& problem = kept.named.problem;
+  double low = 0.0;
+  double high = MaxBoxResidual(problem, kept.structure);
+  bool converged = false;
+  if (options.use_bracket) {
+    const BisectionResult bracket =
+        MinimiseMaxResidual(problem, options.bisection, &kept.structure);
+    solution.num_programs += bracket.num_programs;
+    low = bracket.gamma_low;
+    high = bracket.gamma_high;
+    converged = bracket.status == BisectionStatus::kConverged;
+    if (options.start == "bisection" && high < kInfinity) {
+      TakeCenters(kept.named.views, bracket.structure.center_in_world, centers);
+    }
+  }
+  solution.gamma_low = std::max(solution.gamma_low, low);
+  solution.gamma_high =
+      solution.gamma_high == kInfinity ? high : std::max(solution.gamma_high, high);
+  solution.num_bracket_observations += static_cast<int>(problem.observations.size());
+  solution.num_bracket_tracks += problem.num_points;
+  return converged;
+}
+
 // Moves a component to its gauge: first centre at the origin, median depth one.
-void Normalise(CenterMap& centers,
-               const std::vector<Track>& tracks,
-               std::vector<std::optional<TrackPoint>>& points) {
+void Normalise(CenterMap& centers, const std::vector<Track>& tracks, TrackPoints& points) {
   std::vector<double> depths;
   for (std::size_t t = 0; t < tracks.size(); ++t) {
     if (!points[t]) continue;
@@ -342,36 +284,23 @@ std::optional<bool> SolveComponent(const RotationMap& cam_from_world,
                                    const std::vector<double>& thresholds,
                                    const ViewComponent& component,
                                    const KrotOptions& options,
-                                   const Units& units,
+                                   const KrotUnits& units,
                                    KrotSolution& solution) {
   const std::set<FrameId> members(component.views.begin(), component.views.end());
-  const std::size_t num_lp_views =
-      std::min(component.views.size(), static_cast<std::size_t>(options.max_lp_views));
-  const std::set<FrameId> lp_views(
-      component.views.begin(), component.views.begin() + static_cast<std::ptrdiff_t>(num_lp_views));
-  const double min_z = std::cos(options.max_off_axis_deg * kRadFromDeg);
-  const auto lp_tracks = Restricted(tracks, [&](const Observation& observation) {
-    return lp_views.contains(observation.frame) && observation.bearing.z() >= min_z;
-  });
-  ComponentStart start = SolvePrograms(cam_from_world, lp_tracks, options, units, solution);
-  if (!start.solved) return std::nullopt;
-
-  GrowthOptions growth;
-  growth.resection.threshold_rad = units.loose_rad;
-  growth.resection.seed = options.seed;
-  growth.min_angle_rad = units.lp_parallax_rad;
-  growth.threshold_rad = units.loose_rad;
-  const std::size_t before = start.centers.size();
-  if (before < members.size()) {
-    const auto member_tracks = Restricted(tracks, [&](const Observation& observation) {
-      return members.contains(observation.frame);
-    });
-    PlaceViews(cam_from_world, member_tracks, component.views, growth, start.centers);
-  }
-  solution.num_grown_views += static_cast<int>(start.centers.size() - before);
-
-  auto points = TriangulateAll(cam_from_world, start.centers, tracks, thresholds, options, units);
-  Normalise(start.centers, tracks, points);
+  std::optional<ComponentStart> start =
+      StartComponent(cam_from_world, tracks, component, options, units);
+  if (!start) return std::nullopt;
+  CenterMap& centers = start->centers;
+  solution.num_programs += start->num_programs;
+  solution.num_grown_views += start->num_grown_views;
+  const auto triangulate = [&] {
+    return TriangulateAll(cam_from_world, centers, tracks, thresholds, options, units);
+  };
+  TrackPoints points = triangulate();
+  const bool converged =
+      BoundResidual(cam_from_world, tracks, points, options, units, centers, solution);
+  if (options.start == "bisection") points = triangulate();
+  Normalise(centers, tracks, points);
   const int number =
       solution.component.empty()
           ? 0
@@ -379,7 +308,7 @@ std::optional<bool> SolveComponent(const RotationMap& cam_from_world,
                                  solution.component.end(),
                                  [](const auto& a, const auto& b) { return a.second < b.second; })
                     ->second;
-  for (const auto& [frame, center] : start.centers) {
+  for (const auto& [frame, center] : centers) {
     solution.center_in_world[frame] = center;
     solution.component[frame] = number;
   }
@@ -395,10 +324,10 @@ std::optional<bool> SolveComponent(const RotationMap& cam_from_world,
       solution.removed.push_back({tracks[t].id, observation.frame, RemovalReason::kOtherComponent});
     }
   }
-  return start.bracket_converged;
+  return converged;
 }
 
-void Describe(int num_views, int num_failed, const Units& units, KrotSolution& solution) {
+void Describe(int num_views, int num_failed, const KrotUnits& units, KrotSolution& solution) {
   const int num_placed = static_cast<int>(solution.center_in_world.size());
   int num_components = 0;
   for (const auto& [frame, number] : solution.component) {
@@ -423,7 +352,7 @@ void Solve(const RotationMap& cam_from_world,
            const std::vector<Track>& input,
            const std::map<FrameId, double>& sigma_rad,
            const KrotOptions& options,
-           Units units,
+           KrotUnits units,
            KrotSolution& solution) {
   std::vector<Track> tracks = CleanTracks(input, solution);
   const std::vector<double> thresholds = TrackThresholds(tracks, sigma_rad, options, units);
@@ -478,46 +407,6 @@ void Solve(const RotationMap& cam_from_world,
 
 }  // namespace
 
-std::optional<std::string> KrotOptions::Problem() const {
-  if (start != "l1" && start != "bisection" && start != "linear") {
-    return "start is '" + start + "', must be l1, bisection or linear";
-  }
-  if (start == "bisection" && !use_bracket) {
-    return "start is 'bisection', which needs use_bracket";
-  }
-  if (!(threshold_px > 0.0)) return OutOfRange("threshold_px", threshold_px, "above 0");
-  if (!(threshold_sigmas >= 0.0)) {
-    return OutOfRange("threshold_sigmas", threshold_sigmas, "at least 0");
-  }
-  if (!(loose_factor >= 1.0)) return OutOfRange("loose_factor", loose_factor, "at least 1");
-  if (max_lp_views < 2) return OutOfRange("max_lp_views", max_lp_views, "at least 2");
-  if (max_bracket_views < 0)
-    return OutOfRange("max_bracket_views", max_bracket_views, "at least 0");
-  if (observations_per_view < 4) {
-    return OutOfRange("observations_per_view", observations_per_view, "at least 4");
-  }
-  if (!(min_lp_parallax_deg >= 0.0)) {
-    return OutOfRange("min_lp_parallax_deg", min_lp_parallax_deg, "at least 0");
-  }
-  if (!(min_point_angle_deg >= 0.0)) {
-    return OutOfRange("min_point_angle_deg", min_point_angle_deg, "at least 0");
-  }
-  if (!(still_parallax_px >= 0.0)) {
-    return OutOfRange("still_parallax_px", still_parallax_px, "at least 0");
-  }
-  if (min_shared_points < 3) {
-    return OutOfRange("min_shared_points", min_shared_points, "at least 3");
-  }
-  if (!(max_off_axis_deg > 0.0 && max_off_axis_deg < 90.0)) {
-    return OutOfRange("max_off_axis_deg", max_off_axis_deg, "between 0 and 90");
-  }
-  if (num_threads < 1) return OutOfRange("num_threads", num_threads, "at least 1");
-  if (const auto trouble = robust_start.Problem()) return "robust_start." + *trouble;
-  if (const auto trouble = linear_start.Problem()) return "linear_start." + *trouble;
-  if (const auto trouble = bisection.Problem()) return "bisection." + *trouble;
-  return std::nullopt;
-}
-
 KrotSolution SolveKnownRotation(const RotationMap& cam_from_world,
                                 const std::vector<Track>& tracks,
                                 const Camera& camera,
@@ -526,7 +415,7 @@ KrotSolution SolveKnownRotation(const RotationMap& cam_from_world,
   const auto begin = std::chrono::steady_clock::now();
   RequireContract(cam_from_world, tracks, camera, options);
   KrotSolution solution;
-  Solve(cam_from_world, tracks, sigma_rad, options, InUnits(options, camera), solution);
+  Solve(cam_from_world, tracks, sigma_rad, options, KrotUnits(options, camera), solution);
   std::sort(solution.removed.begin(),
             solution.removed.end(),
             [](const RemovedObservation& a, const RemovedObservation& b) {

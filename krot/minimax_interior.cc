@@ -6,13 +6,11 @@
 
 #include <Eigen/Dense>
 
+#include "krot/half_spaces.h"
 #include "krot/lp.h"
 
 namespace rotslam {
 namespace {
-
-using Five = Eigen::Array<double, 5, 1>;
-using Fives = std::vector<Five>;
 
 // What a program takes from its reference, by observation.
 struct ReferenceDepths {
@@ -22,33 +20,20 @@ struct ReferenceDepths {
 };
 
 // The rows of one program: a_k . (X - c) - sigma_k s + r_k = b_k, and e . x = 1.
-class Program {
+class Program : public HalfSpaces {
  public:
   Program(const MinimaxProblem& problem,
           double gamma,
           const ReferenceDepths& reference,
           bool slack_on_depth)
-      : problem_(problem),
-        layout_{problem.num_views(), problem.num_points},
-        gamma_(gamma),
+      : HalfSpaces(problem, gamma),
         depths_(reference.typical),
         floors_(reference.floor),
-        slack_on_depth_(slack_on_depth) {
-    axes_.reserve(problem.observations.size());
-    for (const ImageObservation& observation : problem.observations) {
-      const Eigen::Matrix3d& R_c_w = problem.R_c_w[observation.view];
-      Eigen::Matrix3d axes;
-      axes.col(0) = R_c_w.row(0) - observation.xy.x() * R_c_w.row(2);
-      axes.col(1) = R_c_w.row(1) - observation.xy.y() * R_c_w.row(2);
-      axes.col(2) = R_c_w.row(2);
-      axes_.push_back(axes);
-    }
-    mean_row_ = Eigen::VectorXd::Zero(layout_.size());
-    for (int o = 0; o < size(); ++o) Scatter(o, MeanWeight(o) * axes_[o].col(2), mean_row_);
+        slack_on_depth_(slack_on_depth),
+        mean_row_(Eigen::VectorXd::Zero(layout().size())) {
+    for (int o = 0; o < size(); ++o) Scatter(o, MeanWeight(o) * DepthAxis(o), mean_row_);
   }
 
-  int size() const { return static_cast<int>(axes_.size()); }
-  const StructureLayout& layout() const { return layout_; }
   const Eigen::VectorXd& mean_row() const { return mean_row_; }
   double MeanWeight(int o) const { return 1.0 / (depths_[o] * size()); }
 
@@ -58,46 +43,10 @@ class Program {
   }
   double DepthBound(int o) const { return -floors_[o]; }
 
-  // a_k . (X - c)
-  Five Apply(int o, const Eigen::VectorXd& x) const {
-    const ImageObservation& observation = problem_.observations[o];
-    Eigen::Vector3d d = x.segment<3>(layout_.Point(observation.point));
-    if (observation.view > 0) d -= x.segment<3>(layout_.Center(observation.view));
-    const Eigen::Vector3d m = axes_[o].transpose() * d;
-    const double margin = gamma_ * m.z();
-    return {m.x() - margin, -m.x() - margin, m.y() - margin, -m.y() - margin, -m.z()};
-  }
-  // sum y_k a_k
-  Eigen::Vector3d Transposed(int o, const Five& y) const {
-    return axes_[o] *
-           Eigen::Vector3d(y[0] - y[1], y[2] - y[3], -gamma_ * (y[0] + y[1] + y[2] + y[3]) - y[4]);
-  }
-  // sum D_k a_k a_k^T
-  Eigen::Matrix3d Normal(int o, const Five& D) const {
-    const double x = D[0] + D[1];
-    const double y = D[2] + D[3];
-    const double xz = gamma_ * (D[1] - D[0]);
-    const double yz = gamma_ * (D[3] - D[2]);
-    const double z = gamma_ * gamma_ * (x + y) + D[4];
-    Eigen::Matrix3d weight;
-    weight << x, 0.0, xz, 0.0, y, yz, xz, yz, z;
-    return axes_[o] * weight * axes_[o].transpose();
-  }
-  // Adds an observation's vector to its point and subtracts it from its centre.
-  void Scatter(int o, const Eigen::Vector3d& v, Eigen::VectorXd& sum) const {
-    const ImageObservation& observation = problem_.observations[o];
-    sum.segment<3>(layout_.Point(observation.point)) += v;
-    if (observation.view > 0) sum.segment<3>(layout_.Center(observation.view)) -= v;
-  }
-
  private:
-  const MinimaxProblem& problem_;
-  StructureLayout layout_;
-  double gamma_;
   const std::vector<double>& depths_;
   const std::vector<double>& floors_;
   bool slack_on_depth_;
-  std::vector<Eigen::Matrix3d> axes_;  // columns r1 - u r3, r2 - v r3, r3
   Eigen::VectorXd mean_row_;
 };
 
@@ -156,17 +105,6 @@ double Complementarity(const Iterate& at) {
   double sum = 0.0;
   for (std::size_t o = 0; o < at.y.size(); ++o) sum += (at.y[o] * at.r[o]).sum();
   return sum;
-}
-
-// Largest step in [0, 1] that keeps all entries positive.
-double Ratio(const Fives& value, const Fives& step) {
-  double ratio = 1.0;
-  for (std::size_t o = 0; o < value.size(); ++o) {
-    for (int k = 0; k < 5; ++k) {
-      if (step[o][k] < 0.0) ratio = std::min(ratio, -value[o][k] / step[o][k]);
-    }
-  }
-  return ratio;
 }
 
 // Newton steps from one iterate: the factor serves predictor and corrector.
@@ -303,7 +241,7 @@ struct Reach {
 };
 
 Reach ReachOf(const Iterate& at, const Step& step) {
-  return {Ratio(at.r, step.r), Ratio(at.y, step.y)};
+  return {StepToBoundary(at.r, step.r), StepToBoundary(at.y, step.y)};
 }
 
 // What moves the products after a step somewhat longer than `reach` back towards `mu`.
@@ -391,31 +329,6 @@ bool NewtonStep(const Program& program, StructureSystem& system, Iterate& at, Ac
   accuracy.expected = (1.0 - kShortOf * reach.dual) * accuracy.dual_error;
   Advance(program, step, kShortOf * reach.primal, kShortOf * reach.dual, at);
   return true;
-}
-
-Eigen::VectorXd Packed(const StructureLayout& layout, const MinimaxStructure& structure) {
-  Eigen::VectorXd x(layout.size());
-  const Eigen::Vector3d origin = structure.center_in_world[0];
-  for (int view = 1; view < layout.num_views; ++view) {
-    x.segment<3>(layout.Center(view)) = structure.center_in_world[view] - origin;
-  }
-  for (int i = 0; i < layout.num_points; ++i) {
-    x.segment<3>(layout.Point(i)) = structure.point_in_world[i] - origin;
-  }
-  return x;
-}
-
-MinimaxStructure Unpacked(const StructureLayout& layout, const Eigen::VectorXd& x) {
-  MinimaxStructure structure;
-  structure.center_in_world.assign(layout.num_views, Eigen::Vector3d::Zero());
-  for (int view = 1; view < layout.num_views; ++view) {
-    structure.center_in_world[view] = x.segment<3>(layout.Center(view));
-  }
-  structure.point_in_world.reserve(layout.num_points);
-  for (int i = 0; i < layout.num_points; ++i) {
-    structure.point_in_world.emplace_back(x.segment<3>(layout.Point(i)));
-  }
-  return structure;
 }
 
 // With the mean's price spread over the depth bounds: the multipliers of the cone alone.

@@ -75,16 +75,6 @@ MinimaxLpResult FromDual(const LpResult& lp, const StructureLayout& rows) {
   return result;
 }
 
-void RequireUsable(const MinimaxProblem& problem, double gamma) {
-  CheckProblem(problem);
-  if (problem.num_views() < 2 || problem.num_points < 1 || problem.observations.empty()) {
-    throw std::invalid_argument("minimax problem: needs two views, a point and an observation");
-  }
-  if (!(gamma >= 0.0) || !std::isfinite(gamma)) {
-    throw std::invalid_argument("minimax problem: gamma must be finite and not negative");
-  }
-}
-
 using NormalTable = std::vector<std::array<Eigen::Vector3d, 5>>;
 
 // Sums whose rounding is summed as well (Neumaier): they err by a few units in the last place of
@@ -178,6 +168,16 @@ bool RepairStep(const MinimaxProblem& problem,
 
 }  // namespace
 
+void RequireProgram(const MinimaxProblem& problem, double gamma) {
+  CheckProblem(problem);
+  if (problem.num_views() < 2 || problem.num_points < 1 || problem.observations.empty()) {
+    throw std::invalid_argument("minimax problem: needs two views, a point and an observation");
+  }
+  if (!(gamma >= 0.0) || !std::isfinite(gamma)) {
+    throw std::invalid_argument("minimax problem: gamma must be finite and not negative");
+  }
+}
+
 std::array<Eigen::Vector3d, 5> HalfSpaceNormals(const Eigen::Matrix3d& R_c_w,
                                                 const Eigen::Vector2d& xy,
                                                 double gamma) {
@@ -194,7 +194,7 @@ std::array<Eigen::Vector3d, 5> HalfSpaceNormals(const Eigen::Matrix3d& R_c_w,
 MinimaxLpResult SolveFeasibility(const MinimaxProblem& problem,
                                  double gamma,
                                  const LpOptions& options) {
-  RequireUsable(problem, gamma);
+  RequireProgram(problem, gamma);
   const StructureLayout rows{problem.num_views(), problem.num_points};
   LinearProgram program = DualRows(rows);
   const int budget_row = program.num_rows();
@@ -208,7 +208,7 @@ MinimaxLpResult SolveL1Slack(const MinimaxProblem& problem,
                              double depth_price,
                              const std::vector<double>& weights,
                              const LpOptions& options) {
-  RequireUsable(problem, gamma);
+  RequireProgram(problem, gamma);
   if (!weights.empty() && weights.size() != problem.observations.size()) {
     throw std::invalid_argument("L1 slack program: one weight per observation expected");
   }

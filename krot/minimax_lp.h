@@ -19,6 +19,10 @@ namespace rotslam {
 //   below, above  +-(r2 - v r3) - gamma r3,  b = 0
 //   depth         -r3,                       b = -1    (fixes the scale: smallest depth one)
 
+/// Throws std::invalid_argument where there is no such program: a problem that CheckProblem refuses
+/// or without two views, a point and an observation, a gamma that is negative or not finite.
+void RequireProgram(const MinimaxProblem& problem, double gamma);
+
 /// Normals a_0 .. a_4 of one observation, in world axes.
 std::array<Eigen::Vector3d, 5> HalfSpaceNormals(const Eigen::Matrix3d& R_c_w,
                                                 const Eigen::Vector2d& xy,

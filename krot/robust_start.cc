@@ -4,6 +4,7 @@
 #include <stdexcept>
 #include <utility>
 
+#include "krot/l1_interior.h"
 #include "rotodom/types/options.h"
 
 namespace rotslam {
@@ -34,13 +35,30 @@ std::vector<double> NextWeights(const MinimaxProblem& problem,
   return weights;
 }
 
+MinimaxLpResult SolveProgram(const MinimaxProblem& problem,
+                             double gamma,
+                             const std::vector<double>& weights,
+                             const RobustStartOptions& options,
+                             double tolerance) {
+  if (options.method == "interior") {
+    L1InteriorOptions interior;
+    interior.tolerance = tolerance;
+    MinimaxLpResult result =
+        SolveL1SlackInterior(problem, gamma, options.depth_price, weights, interior);
+    if (result.call == LpCallStatus::kCompleted) return result;
+  }
+  return SolveL1Slack(problem, gamma, options.depth_price, weights, options.lp);
+}
+
 // One program; false leaves the answer of the one before.
 bool SolveRound(const MinimaxProblem& problem,
                 double gamma,
                 const std::vector<double>& weights,
                 const RobustStartOptions& options,
                 RobustStart& start) {
-  MinimaxLpResult lp = SolveL1Slack(problem, gamma, options.depth_price, weights, options.lp);
+  // The rounds' answers only set prices.
+  const double tolerance = gamma > 0.0 ? 1e-4 : 1e-6;
+  MinimaxLpResult lp = SolveProgram(problem, gamma, weights, options, tolerance);
   ++start.num_programs;
   if (lp.call != LpCallStatus::kCompleted) return false;
   start.call = lp.call;
@@ -55,6 +73,9 @@ bool SolveRound(const MinimaxProblem& problem,
 }  // namespace
 
 std::optional<std::string> RobustStartOptions::Problem() const {
+  if (method != "interior" && method != "programs") {
+    return "method is '" + method + "', must be interior or programs";
+  }
   if (max_rounds < 1) return OutOfRange("max_rounds", max_rounds, "at least 1");
   if (!(depth_price > 0.0)) {
     return OutOfRange("depth_price", depth_price, "above 0");

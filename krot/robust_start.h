@@ -10,6 +10,9 @@
 namespace rotslam {
 
 struct RobustStartOptions {
+  // "interior": our own interior-point programs, the LP engine where they do not converge.
+  // "programs": the LP engine alone, ten to a hundred times the time.
+  std::string method = "interior";
   // Linear programs at most. The first is plain L1, each later one lowers the price of what the one
   // before called an outlier. With 10 % uniform outliers three rounds lose below 1 % of the
   // inliers, one round 30 % (RobustStart tests); without outliers the first round ends it.
@@ -27,6 +30,7 @@ struct RobustStartOptions {
 
   template <class Visitor>
   void Visit(Visitor&& visit) {
+    visit("method", method);
     visit("max_rounds", max_rounds);
     visit("depth_price", depth_price);
     visit("use_sharpening", use_sharpening);

@@ -1,0 +1,31 @@
+#pragma once
+
+#include <optional>
+#include <vector>
+
+#include "krot/components.h"
+#include "krot/krot_options.h"
+#include "rotodom/types/maps.h"
+#include "rotodom/types/track.h"
+
+namespace rotslam {
+
+/// First positions of one rigid component.
+struct ComponentStart {
+  CenterMap centers;
+  int num_programs = 0;
+  int num_grown_views = 0;  // placed by resection
+};
+
+/// Solves the robust start's programs over a spread of tracks and places the views that they leave
+/// out, by resection. With options.start "linear" SolveLinearStart has the last word over what the
+/// programs kept.
+/// @param tracks  clean: finite unit bearings, frames ascending.
+/// @return  nullopt when the programs give no structure.
+std::optional<ComponentStart> StartComponent(const RotationMap& cam_from_world,
+                                             const std::vector<Track>& tracks,
+                                             const ViewComponent& component,
+                                             const KrotOptions& options,
+                                             const KrotUnits& units);
+
+}  // namespace rotslam

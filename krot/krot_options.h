@@ -1,0 +1,94 @@
+#pragma once
+
+#include <cstdint>
+#include <optional>
+#include <string>
+
+#include "krot/bisection.h"
+#include "krot/linear_start.h"
+#include "krot/robust_start.h"
+#include "rotodom/camera/camera.h"
+
+namespace rotslam {
+
+struct KrotOptions {
+  // Which answer gives the positions: "l1", the least sum of misses, forgives outliers and is the
+  // better start for bundle adjustment; "bisection", the least largest residual of what l1 kept;
+  // "linear", equations between the centres (SolveLinearStart) on the same. All lead bundle
+  // adjustment to one minimum.
+  // The bracket is found either way (see use_bracket).
+  std::string start = "l1";
+  // Image bound of the L1 start: observations within it cost nothing. It must cover feature noise
+  // and rotation error together: 0.3 deg moves a point by 3.7 px at f = 700.
+  double threshold_px = 4.0;
+  // Where orientations are less certain than that, the bound is this many standard deviations of a
+  // track's keypoints and of its views' orientations together.
+  double threshold_sigmas = 3.0;
+  // Observations of triangulated points are kept up to this many thresholds. The positions are a
+  // start, good to a few metres over 150: a tight test here throws good observations away.
+  double loose_factor = 2.0;
+  // Find [gamma_low, gamma_high] of all observations that fit the start.
+  bool use_bracket = true;
+  // Views that go into the start's programs. Components with more start from this many and grow
+  // view by view from there.
+  int max_lp_views = 150;
+  // Observations per view in the start's programs.
+  int observations_per_view = 40;
+  // Tracks under this parallax come into the linear programs last, for the sake of conditioning.
+  double min_lp_parallax_deg = 1.0;
+  // Points of the answer are seen under at least this angle.
+  double min_point_angle_deg = 0.5;
+  // Below this flow beyond rotation a track says nothing of positions; noise and rotation error
+  // alone reach a few px.
+  double still_parallax_px = 4.0;
+  // Known points a view must see to belong to a component.
+  int min_shared_points = 8;
+  // Remove what contradicts the rotations pair by pair before anything else.
+  bool use_epipolar_filter = true;
+  // Observations further than this off the optical axis have no bounded image coordinates and stay
+  // out of the linear programs (they are triangulated all the same).
+  double max_off_axis_deg = 80.0;
+  RobustStartOptions robust_start;
+  LinearStartOptions linear_start;
+  BisectionOptions bisection;
+  std::uint64_t seed = 1;
+  int num_threads = 1;
+
+  std::optional<std::string> Problem() const;
+
+  template <class Visitor>
+  void Visit(Visitor&& visit) {
+    visit("start", start);
+    visit("threshold_px", threshold_px);
+    visit("threshold_sigmas", threshold_sigmas);
+    visit("loose_factor", loose_factor);
+    visit("use_bracket", use_bracket);
+    visit("max_lp_views", max_lp_views);
+    visit("observations_per_view", observations_per_view);
+    visit("min_lp_parallax_deg", min_lp_parallax_deg);
+    visit("min_point_angle_deg", min_point_angle_deg);
+    visit("still_parallax_px", still_parallax_px);
+    visit("min_shared_points", min_shared_points);
+    visit("use_epipolar_filter", use_epipolar_filter);
+    visit("max_off_axis_deg", max_off_axis_deg);
+    visit("robust_start", robust_start);
+    visit("linear_start", linear_start);
+    visit("bisection", bisection);
+    visit("seed", seed);
+  }
+};
+
+/// Those of the options that are lengths and angles, in the units the stages use.
+struct KrotUnits {
+  double focal_px;
+  double gamma;            // threshold_px, normalised
+  double still_rad;        // still_parallax_px
+  double lp_parallax_rad;  // min_lp_parallax_deg
+  double point_angle_rad;  // min_point_angle_deg
+  double loose_rad;        // loose_factor * threshold_px
+  double min_z;            // cosine of max_off_axis_deg
+
+  KrotUnits(const KrotOptions& options, const Camera& camera);
+};
+
+}  // namespace rotslam

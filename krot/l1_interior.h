@@ -1,0 +1,31 @@
+#pragma once
+
+#include <vector>
+
+#include "krot/minimax_lp.h"
+#include "krot/minimax_problem.h"
+
+namespace rotslam {
+
+struct L1InteriorOptions {
+  // Ends when the gap between the program's bounds is below this share of the objective, or of what
+  // missing one smallest depth costs.
+  double tolerance = 1e-6;
+  int max_iterations = 100;
+};
+
+/// SolveL1Slack by an interior-point method of our own, which eliminates the slacks and points and
+/// factors the centres' system: some hundred times less work than a general engine.
+/// @param weights  price of each observation's slack, positive; empty: all one.
+/// @return  kCompleted when the tolerance was reached. Multipliers are those of the last iterate.
+///          Throws std::invalid_argument as SolveL1Slack does.
+/// Cost:    20 to 40 iterations of a StructureSystem.
+/// Source:  Mehrotra, On the implementation of a primal-dual interior point method, SIAM J. Opt.
+///          1992, for variables with an upper bound.
+MinimaxLpResult SolveL1SlackInterior(const MinimaxProblem& problem,
+                                     double gamma,
+                                     double depth_price,
+                                     const std::vector<double>& weights = {},
+                                     const L1InteriorOptions& options = {});
+
+}  // namespace rotslam
