@@ -37,6 +37,7 @@ void AddSolveCommand(CLI::App& app, Action& action);
 void AddSimulateCommand(CLI::App& app, Action& action);
 void AddAverageCommand(CLI::App& app, Action& action);
 void AddEvalCommand(CLI::App& app, Action& action);
+void AddPanoramaCommand(CLI::App& app, Action& action);
 void AddVocabularyCommand(CLI::App& app, Action& action);
 
 }  // namespace rotslam

@@ -156,6 +156,7 @@ RunSummary StartSummary(const std::string& command,
   summary.camera = input.camera;
   const auto count = [](std::size_t value) { return static_cast<std::int64_t>(value); };
   summary.sequence = {{"description", input.sequence->Describe()},
+                      {"path", input.path},
                       {"camera_file", input.camera_file},
                       {"first_timestamp_s", orientations.timestamps_s.front()},
                       {"last_timestamp_s", orientations.timestamps_s.back()}};
