@@ -160,7 +160,7 @@ Frames ChooseFrames(const PanoramaFlags& flags, int num_frames) {
 
 // Frames so far apart that each shows something new; most videos repeat themselves.
 std::vector<int> Thinned(const Trajectory& poses, const Frames& frames, const Camera& camera) {
-  constexpr double kNews = 0.02;  // of the image's width
+  constexpr double kNews = 0.04;  // of the image's width
   const double enough_rad = kNews * camera.width / camera.fx;
   std::vector<int> chosen = {frames.first};
   for (int n = frames.first + 1; n <= frames.last; ++n) {

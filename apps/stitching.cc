@@ -17,13 +17,6 @@ namespace {
 
 constexpr double kPi = std::numbers::pi;
 
-// Unit vector on the sphere: x right, y down, z forward at longitude and latitude zero.
-Eigen::Vector3d DirectionAt(double longitude, double latitude) {
-  return {std::cos(latitude) * std::sin(longitude),
-          -std::sin(latitude),
-          std::cos(latitude) * std::cos(longitude)};
-}
-
 // The sphere's axes: level with the views' pan, forward where the first view looks.
 Rotation SphereFromWorld(const std::vector<Rotation>& world_from_cam) {
   Eigen::Matrix3d spread = Eigen::Matrix3d::Zero();
@@ -77,11 +70,19 @@ double ViewRadius(const Camera& camera) {
 
 // The pixels of the whole sphere.
 struct Grid {
+  explicit Grid(int columns) : width(columns), height(columns / 2) {
+    forward.reserve(width);
+    for (int column = 0; column < width; ++column) {
+      const double longitude = (column + 0.5) / width * 2.0 * kPi - kPi;
+      forward.emplace_back(std::sin(longitude), std::cos(longitude));
+    }
+  }
+
+  double Latitude(int row) const { return 0.5 * kPi - (row + 0.5) / height * kPi; }
+
   int width;
   int height;
-
-  double Longitude(int column) const { return (column + 0.5) / width * 2.0 * kPi - kPi; }
-  double Latitude(int row) const { return 0.5 * kPi - (row + 0.5) / height * kPi; }
+  std::vector<Eigen::Vector2d> forward;  // x and z on the equator, by column
 };
 
 // Columns first .. first + count - 1, those beyond the right edge going on at the left.
@@ -117,17 +118,22 @@ class ProjectedView {
       : camera_(camera),
         R_c_s_(sphere_from_cam.Inverse().Matrix()),
         center_(sphere_from_cam * Eigen::Vector3d::UnitZ()),
-        radius_(radius) {}
+        radius_(radius),
+        smallest_cosine_(std::cos(radius)) {}
 
   // Calls use(column, pixel) for the pixels of a row of the grid that the view shows.
   template <class Use>
   void ForRow(const Grid& grid, int row, const Use& use) const {
     const double latitude = grid.Latitude(row);
+    const double sine = std::sin(latitude);
+    const double cosine = std::cos(latitude);
     const Columns columns = ColumnsWithin(grid, center_, radius_, latitude);
     for (int k = 0; k < columns.count; ++k) {
       const int column = (columns.first + k) % grid.width;
-      const Eigen::Vector3d direction = DirectionAt(grid.Longitude(column), latitude);
-      if (direction.dot(center_) < std::cos(radius_)) continue;
+      // x right, y down, z forward.
+      const Eigen::Vector2d& forward = grid.forward[column];
+      const Eigen::Vector3d direction(cosine * forward.x(), -sine, cosine * forward.y());
+      if (direction.dot(center_) < smallest_cosine_) continue;
       const auto pixel = camera_.Project(R_c_s_ * direction);
       if (!pixel || pixel->x() < 0.0 || pixel->y() < 0.0 || pixel->x() > camera_.width - 1 ||
           pixel->y() > camera_.height - 1) {
@@ -142,6 +148,7 @@ class ProjectedView {
   Eigen::Matrix3d R_c_s_;
   Eigen::Vector3d center_;
   double radius_;
+  double smallest_cosine_;
 };
 
 // Bilinear; the pixel lies within the image.
@@ -163,7 +170,7 @@ cv::Vec3f Sample(const cv::Mat& image, const Eigen::Vector2d& pixel) {
 using Cells = std::map<int, double>;
 
 Cells BrightnessOf(const cv::Mat& image, const ProjectedView& view) {
-  constexpr Grid kCoarse{360, 180};
+  static const Grid kCoarse(360);
   Cells cells;
   for (int row = 0; row < kCoarse.height; ++row) {
     view.ForRow(kCoarse, row, [&](int column, const Eigen::Vector2d& pixel) {
@@ -299,8 +306,7 @@ Grid GridOf(const Camera& camera, const StitchOptions& options) {
     width = std::min(static_cast<int>(std::lround(2.0 * kPi * camera.MeanFocal())),
                      StitchOptions::kMaxWidth);
   }
-  width = std::max(2, width - width % 2);
-  return {width, width / 2};
+  return Grid(std::max(2, width - width % 2));
 }
 
 }  // namespace
