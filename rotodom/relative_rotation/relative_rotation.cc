@@ -14,6 +14,29 @@
 namespace rotslam {
 namespace {
 
+// Which rotation to believe is another question than whether there is a baseline: where both models
+// fit, as on the narrow strip that views after a long turn share, a small baseline would go into
+// the rotation. Torr's geometric information criterion for four-dimensional data (two image points
+// a match).
+// @param squared_distances, squared_flows  of all pairs under either model, rad^2.
+bool RotationExplains(const std::vector<double>& squared_distances,
+                      const std::vector<double>& squared_flows,
+                      double noise) {
+  const double n = static_cast<double>(squared_distances.size());
+  const double per_dimension = std::log(4.0);
+  const double per_parameter = std::log(4.0 * n);
+  const double per_variance = 1.0 / (noise * noise);
+  double epipolar = 3.0 * n * per_dimension + 5.0 * per_parameter;
+  for (const double squared : squared_distances) epipolar += std::min(squared * per_variance, 2.0);
+  double rotation = 2.0 * n * per_dimension + 3.0 * per_parameter;
+  // Both images' noise enters the difference of the bearings, so its variance per axis is twice the
+  // noise's.
+  for (const double squared : squared_flows) {
+    rotation += std::min(0.5 * squared * per_variance, 4.0);
+  }
+  return rotation < epipolar;
+}
+
 // Whether the members' matches show a baseline.
 BaselineEvidence EvidenceOf(const PairArrays& members,
                             const std::vector<int>& member_indices,
@@ -161,7 +184,11 @@ std::optional<RelativeRotationEstimate> EstimateRelativeRotation(
       !estimate.baseline.ShowsBaseline() && num_turned >= kSmallestTurnedShare * num_inliers;
   // The rotation's own block bounds what either model can know of it.
   if (!IsFixed(rotation.H)) return std::nullopt;
-  if (estimate.rotation_only) {
+  const bool believes_rotation =
+      RotationExplains(squared_distances,
+                       SquaredFlows(arrays, rotation.j_from_i),
+                       std::hypot(noise, options.shared_error_px / focal_px));
+  if (believes_rotation) {
     estimate.j_from_i = rotation.j_from_i;
     // A baseline that shows no more flow than the shared error goes into the rotation; on rendered
     // gimbals, half of it did.
@@ -174,10 +201,13 @@ std::optional<RelativeRotationEstimate> EstimateRelativeRotation(
     return estimate;
   }
   estimate.j_from_i = epipolar.model.j_from_i;
-  estimate.translation_direction = WithForwardSign(all, estimate.inliers, epipolar.model);
   const Eigen::Matrix<double, 5, 5> covariance = noise * noise * epipolar.normal.H.inverse();
   if (!covariance.allFinite()) return std::nullopt;
   estimate.covariance = covariance.topLeftCorner<3, 3>();
+  estimate.translation_direction.setZero();
+  estimate.translation_covariance.setZero();
+  if (estimate.rotation_only) return estimate;
+  estimate.translation_direction = WithForwardSign(all, estimate.inliers, epipolar.model);
   const Eigen::Matrix<double, 3, 2> basis = TangentBasis(epipolar.model.direction);
   estimate.translation_covariance =
       basis * covariance.bottomRightCorner<2, 2>() * basis.transpose();

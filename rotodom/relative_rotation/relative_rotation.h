@@ -71,7 +71,7 @@ struct RelativeRotationOptions {
 struct RelativeRotationEstimate {
   Rotation j_from_i;
   Eigen::Matrix3d covariance;  // of delta in Exp(delta) * j_from_i, rad^2
-  // x_j = R x_i + s t, s > 0; unit, or zero when rotation_only.
+  // x_j = R x_i + s t, s > 0; unit, or zero when rotation_only or j_from_i is that of no baseline.
   Eigen::Vector3d translation_direction;
   // Of the direction's small changes, rad^2: rank two, zero along the direction; zero when
   // rotation_only.
@@ -91,8 +91,10 @@ struct RelativeRotationEstimate {
 /// the truncated Sampson distance, which stays valid as the baseline vanishes (consensus.h). The
 /// best is refined on all matches but those that only chance makes agree: once as (rotation,
 /// translation direction) on the Sampson distance and once as rotation alone, both with a
-/// redescending loss; TestBaseline chooses the model. Matches that carry a MatchNoise are weighted
-/// by it throughout.
+/// redescending loss. TestBaseline decides whether there is a baseline, Torr's geometric
+/// information criterion which of the two rotations is the better one; they ask different questions
+/// and differ where the baseline is at the limit. Matches that carry a MatchNoise are weighted by
+/// it throughout.
 /// @param pairs                matched bearings, wrong ones among them; a bearing that is not
 /// finite
 ///                             or a covariance that is none throws std::invalid_argument.
@@ -107,7 +109,8 @@ struct RelativeRotationEstimate {
 ///          to 2.2. A baseline too small for the evidence (0.3 % at 1 px) goes into the rotation
 ///          and not into its covariance.
 /// Cost:    0.3 ms for 1,000 matches with AVX2, 1.2 ms when samples must be drawn to the end.
-/// Source:  Muhle et al., The Probabilistic Normal Epipolar Constraint, CVPR 2022 (weights).
+/// Source:  Torr, Geometric motion segmentation and model selection, 1998 (criterion); Muhle et
+/// al., The Probabilistic Normal Epipolar Constraint, CVPR 2022 (weights).
 std::optional<RelativeRotationEstimate> EstimateRelativeRotation(
     const std::vector<BearingPair>& pairs,
     const Rotation& predicted_j_from_i,
