@@ -102,6 +102,7 @@ RefinedComponents RefineComponents(const RotationMap& cam_from_world,
   if (refined.components.size() == 1) return refined;
   BundleOptions same_lens = options;
   same_lens.lens.refine_focal = same_lens.lens.refine_distortion = false;
+  same_lens.lens.refine_principal_point = false;
   const std::vector<Track> seen = WithBearingsOf(refined.camera, tracks);
   for (std::size_t k = 0; k < refined.components.size(); ++k) {
     if (k != first) refine(k, seen, same_lens);

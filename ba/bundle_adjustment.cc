@@ -94,6 +94,10 @@ class Rounds {
 
   // The same, until classification changes next to nothing.
   void Repeat(const std::string& name, const BundleRound& round, BundleState& state) {
+    // Few observations have changed: a step or two.
+    constexpr double kEasier = 10.0;
+    BundleRound again = round;
+    again.function_tolerance *= kEasier;
     Run(name, round, state);
     for (int k = 1; k < options_.max_fine_rounds; ++k) {
       if (!good_ || !round.enabled) return;
@@ -105,7 +109,7 @@ class Rounds {
       for (std::size_t o = 0; o < after.size(); ++o) changed += before[o] != after[o] ? 1 : 0;
       const auto total = static_cast<double>(std::count(after.begin(), after.end(), true));
       if (static_cast<double>(changed) <= options_.max_changed_share * total) return;
-      Minimise(name, round, start, state);
+      Minimise(name, again, start, state);
     }
   }
 
@@ -113,7 +117,7 @@ class Rounds {
   void TryLens(const BundleRound& round, BundleState& state) {
     const LensOptions& lens = options_.lens;
     if (!good_ || !round.enabled) return;
-    if (!lens.refine_focal && !lens.refine_distortion) return;
+    if (!lens.refine_focal && !lens.refine_principal_point && !lens.refine_distortion) return;
     const BundleState before = state;
     refine_lens_ = true;
     Minimise("lens", round, std::chrono::steady_clock::now(), state);

@@ -18,6 +18,7 @@ std::optional<std::string> BundleRound::Problem() const {
 
 std::optional<std::string> LensOptions::Problem() const {
   if (!(focal_sigma > 0.0)) return OutOfRange("focal_sigma", focal_sigma, "positive");
+  if (!(principal_sigma > 0.0)) return OutOfRange("principal_sigma", principal_sigma, "positive");
   if (!(distortion_sigma > 0.0)) {
     return OutOfRange("distortion_sigma", distortion_sigma, "positive");
   }

@@ -51,11 +51,15 @@ struct LensOptions {
   // Off: along a path the focal length trades with positions, and on EuRoC, whose calibration is
   // good, it moves by 1.2 % to make up for wrong matches.
   bool refine_focal = false;
+  // Off: hardly told from a turn of the camera.
+  bool refine_principal_point = false;
   // Standard deviation of each radial coefficient given, and of the focal length given, as a share
   // of it. They count as one observation each among thousands that err alike, so they are tighter
   // than a calibration deserves.
   double distortion_sigma = 0.005;
   double focal_sigma = 0.003;
+  // Of the principal point, in focal lengths.
+  double principal_sigma = 0.003;
   // The calibration stands unless another lens takes this share off the cost. Errors of
   // neighbouring observations are alike, so that some lens always gains a little: 0.0003 on a
   // simulated street, whose calibration is exact, 0.005 on EuRoC. Where distortion is left it gains
@@ -68,8 +72,10 @@ struct LensOptions {
   void Visit(Visitor&& visit) {
     visit("refine_distortion", refine_distortion);
     visit("refine_focal", refine_focal);
+    visit("refine_principal_point", refine_principal_point);
     visit("distortion_sigma", distortion_sigma);
     visit("focal_sigma", focal_sigma);
+    visit("principal_sigma", principal_sigma);
     visit("min_gain", min_gain);
   }
 };
@@ -89,7 +95,7 @@ struct BundleOptions {
   int preparing_observations = 300;
   // The last round is repeated, at most so many times in all, until classification changes less
   // than this share of the observations: then the result does not depend on where it started.
-  int max_fine_rounds = 4;
+  int max_fine_rounds = 6;
   double max_changed_share = 2e-4;
   // false holds the rotations in every round: they come out bit by bit as they went in.
   bool refine_rotations = true;
@@ -107,9 +113,9 @@ struct BundleOptions {
   // points follow any outlier.
   int min_frame_observations = 12;
 
-  // Up to this many camera blocks the reduced system is factored densely (DENSE_SCHUR), above by
-  // CHOLMOD (SPARSE_SCHUR).
-  int max_dense_frames = 40;
+  // Up to this many frames the reduced system is factored densely (DENSE_SCHUR), above by CHOLMOD
+  // (SPARSE_SCHUR).
+  int max_dense_frames = 120;
   // For triangulation and classification. The solver itself runs on one thread: Ceres adds up in
   // the order in which threads finish, which changes last digits from run to run.
   int num_threads = 1;

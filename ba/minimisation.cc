@@ -9,6 +9,8 @@
 #include <ceres/ordered_groups.h>
 #include <ceres/problem.h>
 
+#include "ba/lens.h"
+#include "ba/pose_manifold.h"
 #include "ba/reprojection_cost.h"
 
 namespace rotslam {
@@ -29,6 +31,56 @@ std::unique_ptr<ceres::LossFunction> MakeLoss(const BundleRound& round) {
   return nullptr;
 }
 
+// Whether some frames stand at one place.
+bool SharesCenters(const BundleState& state) {
+  std::vector<bool> taken(state.centers.size(), false);
+  return std::any_of(state.frames.begin(), state.frames.end(), [&](const FrameState& frame) {
+    const bool shared = taken[frame.center];
+    taken[frame.center] = true;
+    return shared;
+  });
+}
+
+// The cameras' numbers, in one piece of memory: Ceres sorts the blocks of a group by address, and
+// with it the order of elimination, which must not depend on where an allocation lands. Poses are
+// one block each, which eliminates points three times as fast as rotations and centres apart; only
+// frames that share a centre need those.
+class CameraBlocks {
+ public:
+  explicit CameraBlocks(const BundleState& state)
+      : joint_(!SharesCenters(state)),
+        num_centers_(state.centers.size()),
+        frame_of_center_(state.centers.size(), 0),
+        numbers_(joint_ ? 7 * state.frames.size()
+                        : 3 * state.centers.size() + 4 * state.frames.size()) {
+    for (std::size_t k = 0; k < state.frames.size(); ++k) {
+      const Eigen::Vector4d q = state.frames[k].cam_from_world.Quaternion().coeffs();
+      std::copy_n(q.data(), 4, Quaternion(k));
+      frame_of_center_[state.frames[k].center] = k;
+      std::copy_n(state.centers[state.frames[k].center].data(), 3, Center(state.frames[k].center));
+    }
+  }
+
+  bool joint() const { return joint_; }
+  // Of a frame: its pose where poses are joint.
+  double* Quaternion(std::size_t frame) {
+    return joint_ ? &numbers_[7 * frame] : &numbers_[3 * num_centers_ + 4 * frame];
+  }
+  double* Center(std::size_t center) {
+    return joint_ ? Quaternion(frame_of_center_[center]) + 4 : &numbers_[3 * center];
+  }
+  // The parameter block that has a centre in it.
+  double* BlockOfCenter(std::size_t center) {
+    return joint_ ? Quaternion(frame_of_center_[center]) : Center(center);
+  }
+
+ private:
+  bool joint_;
+  std::size_t num_centers_;
+  std::vector<std::size_t> frame_of_center_;
+  std::vector<double> numbers_;
+};
+
 // The used observations as a Ceres problem over the state's own numbers.
 class Minimisation {
  public:
@@ -44,16 +96,9 @@ class Minimisation {
         loss_(MakeLoss(round)),
         problem_(ProblemOptions()),
         lens_(LensOf(state.camera, calibrated)),
-        camera_blocks_(3 * state.centers.size() + 4 * state.frames.size()),
+        cameras_(state),
         frame_used_(state.frames.size(), false),
         center_used_(state.centers.size(), false) {
-    for (std::size_t k = 0; k < state.frames.size(); ++k) {
-      const Eigen::Vector4d q = state.frames[k].cam_from_world.Quaternion().coeffs();
-      std::copy_n(q.data(), 4, QuaternionBlock(k));
-    }
-    for (std::size_t c = 0; c < state.centers.size(); ++c) {
-      std::copy_n(state.centers[c].data(), 3, CenterBlock(c));
-    }
     ordering_ = std::make_shared<ceres::ParameterBlockOrdering>();
     AddResiduals();
     if (Empty()) return;
@@ -97,11 +142,6 @@ class Minimisation {
     return options;
   }
 
-  double* CenterBlock(std::size_t center) { return &camera_blocks_[3 * center]; }
-  double* QuaternionBlock(std::size_t frame) {
-    return &camera_blocks_[3 * state_.centers.size() + 4 * frame];
-  }
-
   void AddResiduals() {
     for (TrackState& track : state_.tracks) {
       // With rotations held a direction has nothing to say.
@@ -116,61 +156,52 @@ class Minimisation {
     for (std::size_t k = 0; k < state_.frames.size(); ++k) {
       if (!frame_used_[k]) continue;
       ++counts_.num_frames;
-      problem_.SetManifold(QuaternionBlock(k), &manifold_);
-      ordering_->AddElementToGroup(QuaternionBlock(k), 1);
+      problem_.SetManifold(cameras_.Quaternion(k), ManifoldOfFrames());
+      ordering_->AddElementToGroup(cameras_.Quaternion(k), 1);
     }
-    for (std::size_t k = 0; k < state_.centers.size(); ++k) {
-      if (center_used_[k]) ordering_->AddElementToGroup(CenterBlock(k), 1);
+    if (cameras_.joint()) return;
+    for (std::size_t c = 0; c < state_.centers.size(); ++c) {
+      if (center_used_[c]) ordering_->AddElementToGroup(cameras_.Center(c), 1);
     }
+  }
+
+  ceres::Manifold* ManifoldOfFrames() {
+    if (!cameras_.joint()) return &rotation_manifold_;
+    if (refine_rotations_) return &pose_manifold_;
+    return &center_manifold_;
   }
 
   void AddObservation(TrackState& track, const Sight& sight) {
     const FrameState& frame = state_.frames[sight.frame];
-    double* const quaternion = QuaternionBlock(sight.frame);
     const Observation& observation = *sight.observation;
+    ObservationForm form;
+    form.joint_pose = cameras_.joint();
+    form.at_infinity = track.kind == TrackKind::kDirection;
+    form.moves_lens = refine_lens_;
+    costs_.emplace_back(refine_lens_ ? calibrated_ : state_.camera,
+                        observation.keypoint_px,
+                        observation.sigma_px,
+                        form);
+    std::vector<double*> blocks = {cameras_.Quaternion(sight.frame)};
+    if (!form.joint_pose && !form.at_infinity) blocks.push_back(cameras_.Center(frame.center));
+    blocks.push_back(track.position.data());
+    if (form.moves_lens) blocks.push_back(lens_.data());
+    problem_.AddResidualBlock(&costs_.back(), loss_.get(), blocks);
     frame_used_[sight.frame] = true;
+    if (!form.at_infinity) center_used_[frame.center] = true;
     if (!frame.fixed) moving_ = true;
     ++counts_.num_observations;
-    if (track.kind == TrackKind::kDirection) {
-      AddDirection(observation, quaternion, track.position.data());
-      return;
-    }
-    center_used_[frame.center] = true;
-    AddPoint(observation, quaternion, CenterBlock(frame.center), track.position.data());
-  }
-
-  void AddDirection(const Observation& observation, double* quaternion, double* direction) {
-    if (refine_lens_) {
-      lens_directions_.emplace_back(calibrated_, observation.keypoint_px, observation.sigma_px);
-      problem_.AddResidualBlock(
-          &lens_directions_.back(), loss_.get(), quaternion, direction, lens_.data());
-      return;
-    }
-    directions_.emplace_back(state_.camera, observation.keypoint_px, observation.sigma_px);
-    problem_.AddResidualBlock(&directions_.back(), loss_.get(), quaternion, direction);
-  }
-
-  void AddPoint(const Observation& observation, double* quaternion, double* center, double* point) {
-    if (refine_lens_) {
-      lens_points_.emplace_back(calibrated_, observation.keypoint_px, observation.sigma_px);
-      problem_.AddResidualBlock(
-          &lens_points_.back(), loss_.get(), quaternion, center, point, lens_.data());
-      return;
-    }
-    points_.emplace_back(state_.camera, observation.keypoint_px, observation.sigma_px);
-    problem_.AddResidualBlock(&points_.back(), loss_.get(), quaternion, center, point);
   }
 
   // What is held is held by a tight prior: a block of another size would leave Ceres' specialised
   // elimination.
   void FreeLens(const LensOptions& options) {
-    const double distortion_sigma =
-        options.refine_distortion ? options.distortion_sigma : kHeldSigma;
-    lens_prior_ = std::make_unique<LensPriorCost>(
-        LensOf(calibrated_, calibrated_),
-        LensParameters(options.refine_focal ? options.focal_sigma : kHeldSigma,
-                       distortion_sigma,
-                       distortion_sigma));
+    const double focal = options.refine_focal ? options.focal_sigma : kHeldSigma;
+    const double center = options.refine_principal_point ? options.principal_sigma : kHeldSigma;
+    const double bend = options.refine_distortion ? options.distortion_sigma : kHeldSigma;
+    LensParameters sigmas;
+    sigmas << focal, kHeldSigma, center, center, bend, bend;
+    lens_prior_ = std::make_unique<LensPriorCost>(LensOf(calibrated_, calibrated_), sigmas);
     problem_.AddResidualBlock(lens_prior_.get(), nullptr, lens_.data());
     ordering_->AddElementToGroup(lens_.data(), 1);
   }
@@ -178,7 +209,9 @@ class Minimisation {
   void TakeLens(const LensOptions& options) {
     if (!refine_lens_ || !lens_.allFinite()) return;
     const LensParameters given = LensOf(calibrated_, calibrated_);
+    lens_[1] = given[1];
     if (!options.refine_focal) lens_[0] = given[0];
+    if (!options.refine_principal_point) lens_.segment<2>(2) = given.segment<2>(2);
     if (!options.refine_distortion) lens_.tail<2>() = given.tail<2>();
     SetCamera(WithLens(calibrated_, lens_), state_);
   }
@@ -190,24 +223,23 @@ class Minimisation {
     for (std::size_t k = 0; k < state_.frames.size(); ++k) {
       const FrameState& frame = state_.frames[k];
       if (frame.fixed) held[frame.center] = true;
-      if (frame_used_[k] && (frame.fixed || !refine_rotations_)) {
-        problem_.SetParameterBlockConstant(QuaternionBlock(k));
-      }
+      const bool still = frame.fixed || (!cameras_.joint() && !refine_rotations_);
+      if (frame_used_[k] && still) problem_.SetParameterBlockConstant(cameras_.Quaternion(k));
     }
     for (std::size_t c = 0; c < held.size(); ++c) held[c] = held[c] && center_used_[c];
     int origin = -1;
     int num_held = 0;
     for (std::size_t c = 0; c < held.size(); ++c) {
       if (!held[c]) continue;
-      problem_.SetParameterBlockConstant(CenterBlock(c));
+      problem_.SetParameterBlockConstant(cameras_.BlockOfCenter(c));
       if (origin < 0) origin = static_cast<int>(c);
       ++num_held;
     }
     for (std::size_t k = 0; k < state_.frames.size() && origin < 0; ++k) {
       if (!frame_used_[k] || !center_used_[state_.frames[k].center]) continue;
       origin = state_.frames[k].center;
-      problem_.SetParameterBlockConstant(CenterBlock(origin));
-      problem_.SetParameterBlockConstant(QuaternionBlock(k));
+      problem_.SetParameterBlockConstant(cameras_.BlockOfCenter(origin));
+      problem_.SetParameterBlockConstant(cameras_.Quaternion(k));
     }
     if (num_held < 2) AnchorScale(origin);
   }
@@ -223,18 +255,20 @@ class Minimisation {
     }
     if (farthest < 0) return;
     anchor_ = std::make_unique<ScaleAnchorCost>(
-        state_.centers[origin], state_.centers[farthest], kScaleAnchorWeight);
-    problem_.AddResidualBlock(anchor_.get(), nullptr, CenterBlock(farthest));
+        state_.centers[origin], state_.centers[farthest], kScaleAnchorWeight, cameras_.joint());
+    problem_.AddResidualBlock(anchor_.get(), nullptr, cameras_.BlockOfCenter(farthest));
   }
 
   // Held rotations keep their last bit.
   void TakeCameras() {
     for (std::size_t c = 0; c < state_.centers.size(); ++c) {
-      std::copy_n(CenterBlock(c), 3, state_.centers[c].data());
+      std::copy_n(cameras_.Center(c), 3, state_.centers[c].data());
     }
     for (std::size_t k = 0; k < state_.frames.size(); ++k) {
-      if (!frame_used_[k] || problem_.IsParameterBlockConstant(QuaternionBlock(k))) continue;
-      const Eigen::Quaterniond q(QuaternionBlock(k));
+      double* const quaternion = cameras_.Quaternion(k);
+      if (!frame_used_[k] || !refine_rotations_) continue;
+      if (problem_.IsParameterBlockConstant(quaternion)) continue;
+      const Eigen::Quaterniond q(quaternion);
       if (q.coeffs().allFinite()) state_.frames[k].cam_from_world = Rotation(q);
     }
   }
@@ -244,19 +278,15 @@ class Minimisation {
   const bool refine_lens_;
   BundleState& state_;
   std::unique_ptr<ceres::LossFunction> loss_;
-  LeftRotationManifold manifold_;
-  std::deque<ReprojectionCost> points_;
-  std::deque<DirectionCost> directions_;
-  std::deque<LensReprojectionCost> lens_points_;
-  std::deque<LensDirectionCost> lens_directions_;
+  LeftRotationManifold rotation_manifold_;
+  PoseManifold pose_manifold_;
+  CenterManifold center_manifold_;
+  std::deque<ReprojectionCost> costs_;
   std::unique_ptr<LensPriorCost> lens_prior_;
   std::unique_ptr<ScaleAnchorCost> anchor_;
   ceres::Problem problem_;
   LensParameters lens_;
-  // Centres, then quaternions, in one piece of memory: Ceres sorts the blocks of a group by
-  // address, and with it the order of elimination, which must not depend on where an allocation
-  // lands.
-  std::vector<double> camera_blocks_;
+  CameraBlocks cameras_;
   std::vector<bool> frame_used_;
   std::vector<bool> center_used_;
   std::shared_ptr<ceres::ParameterBlockOrdering> ordering_;

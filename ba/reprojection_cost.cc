@@ -1,136 +1,72 @@
 #include "ba/reprojection_cost.h"
 
-#include <cmath>
+#include <algorithm>
 
 #include <Eigen/Geometry>
 
+#include "ba/quaternion_jacobian.h"
 #include "rotodom/types/rotation.h"
 
 namespace rotslam {
 namespace {
 
-using RowMatrix23 = Eigen::Matrix<double, 2, 3, Eigen::RowMajor>;
-using RowMatrix24 = Eigen::Matrix<double, 2, 4, Eigen::RowMajor>;
-using Matrix43 = Eigen::Matrix<double, 4, 3>;
-using RowMatrix43 = Eigen::Matrix<double, 4, 3, Eigen::RowMajor>;
-using RowMatrix34 = Eigen::Matrix<double, 3, 4, Eigen::RowMajor>;
+constexpr int kPoseSize = 7;
+constexpr double kOrigin[3] = {0.0, 0.0, 0.0};
 
-// The numbers at `data` as a matrix to write to.
-template <class Matrix>
-Eigen::Map<Matrix> As(double* data) {
-  return Eigen::Map<Matrix>(data);
+template <int Cols>
+using RowMatrix = Eigen::Matrix<double, 2, Cols, Eigen::RowMajor>;
+
+// `Cols` columns of a Jacobian block that is `stride` wide.
+template <int Cols>
+Eigen::Map<RowMatrix<Cols>, 0, Eigen::OuterStride<>> Columns(double* data, int stride) {
+  return Eigen::Map<RowMatrix<Cols>, 0, Eigen::OuterStride<>>(data, Eigen::OuterStride<>(stride));
 }
 
-// d (Exp(delta) * q) / d delta at zero, for q = (x, y, z, w) of any length: half the quaternion
-// product (delta, 0) * q.
-Matrix43 LeftJacobian(const Eigen::Quaterniond& q) {
-  Matrix43 J;
-  J << q.w(), q.z(), -q.y(),  //
-      -q.z(), q.w(), q.x(),   //
-      q.y(), -q.x(), q.w(),   //
-      -q.x(), -q.y(), -q.z();
-  return 0.5 * J;
-}
-
-// Its columns are orthogonal, of length |q| / 2, so this is its pseudo-inverse; it is also the
-// derivative of delta by the quaternion that is normalised before use.
-Eigen::Matrix<double, 3, 4> LeftInverseJacobian(const Eigen::Quaterniond& q) {
-  return (4.0 / q.squaredNorm()) * LeftJacobian(q).transpose();
-}
-
-// d(pixel) / d(lens) at a point that the camera sees at `pixel`, the share of the focal length
-// being one.
-Eigen::Matrix<double, 2, 3> LensJacobian(const Camera& camera,
-                                         const Eigen::Vector3d& point_in_cam,
-                                         const Eigen::Vector2d& pixel) {
-  // The distortion's radius and its direction: x (1 + k1 r^2 + k2 r^4) and likewise y.
-  const double r = point_in_cam.head<2>().norm();
-  Eigen::Vector2d axis = point_in_cam.head<2>() / point_in_cam.z();
-  double radius = axis.norm();
-  if (camera.model == CameraModel::kEquidistant) {
-    radius = std::atan2(r, point_in_cam.z());
-    axis = r > 0.0 ? Eigen::Vector2d(radius / r * point_in_cam.head<2>()) : Eigen::Vector2d::Zero();
-  }
-  const double s = radius * radius;
-  const Eigen::Vector2d by_radius(camera.fx * axis.x(), camera.fy * axis.y());
-  Eigen::Matrix<double, 2, 3> J;
-  J.col(0) = pixel - Eigen::Vector2d(camera.cx, camera.cy);
-  J.col(1) = s * by_radius;
-  J.col(2) = s * s * by_radius;
-  return J;
-}
-
-// Where an observation's blocks lie; null where it has no such block.
-struct ReprojectionBlocks {
+// Where an observation's numbers lie, and where its derivatives go; null where it has none.
+struct Blocks {
   const double* quaternion;
-  const double* center;
+  const double* center = kOrigin;
   const double* point;
+  const double* lens = nullptr;
   double* J_quaternion = nullptr;
   double* J_center = nullptr;
   double* J_point = nullptr;
   double* J_lens = nullptr;
+  int quaternion_stride = 4;
+  int center_stride = 3;
+
+  bool WantJacobians() const {
+    return J_quaternion != nullptr || J_center != nullptr || J_point != nullptr ||
+           J_lens != nullptr;
+  }
 };
 
-// @param lens_scale  share of the focal length that `camera` has of the one given.
-void EvaluateReprojection(const Camera& camera,
-                          double lens_scale,
-                          const Eigen::Vector2d& keypoint_px,
-                          double sigma_px,
-                          const ReprojectionBlocks& blocks,
-                          double* residuals) {
-  const Eigen::Quaterniond q(blocks.quaternion);
-  const double weight = 1.0 / sigma_px;
-  const bool wants_jacobian = blocks.J_quaternion != nullptr || blocks.J_center != nullptr ||
-                              blocks.J_point != nullptr || blocks.J_lens != nullptr;
-  ReprojectionJacobian J;
-  const std::optional<Eigen::Vector2d> pixel =
-      Reproject(camera,
-                q.normalized().toRotationMatrix(),
-                Eigen::Map<const Eigen::Vector3d>(blocks.center),
-                Eigen::Map<const Eigen::Vector3d>(blocks.point),
-                wants_jacobian ? &J : nullptr);
-  if (!pixel) {
-    J.by_rotation.setZero();
-    J.by_center.setZero();
-    J.by_point.setZero();
-    J.by_lens.setZero();
+Blocks BlocksOf(const ObservationForm& form, double const* const* parameters, double** jacobians) {
+  const auto jacobian = [&](int block) {
+    return jacobians == nullptr ? nullptr : jacobians[block];
+  };
+  int next = 0;
+  Blocks blocks;
+  blocks.quaternion = parameters[next];
+  blocks.J_quaternion = jacobian(next);
+  if (form.joint_pose) {
+    blocks.quaternion_stride = blocks.center_stride = kPoseSize;
+    if (blocks.J_quaternion != nullptr) blocks.J_center = blocks.J_quaternion + 4;
+    if (!form.at_infinity) blocks.center = blocks.quaternion + 4;
+  } else if (!form.at_infinity) {
+    blocks.center = parameters[++next];
+    blocks.J_center = jacobian(next);
   }
-  Eigen::Map<Eigen::Vector2d> residual(residuals);
-  residual = pixel ? Eigen::Vector2d(weight * (*pixel - keypoint_px))
-                   : Eigen::Vector2d::Constant(weight * kUnseenResidual_px);
-  if (blocks.J_quaternion != nullptr) {
-    As<RowMatrix24>(blocks.J_quaternion) = weight * J.by_rotation * LeftInverseJacobian(q);
+  blocks.point = parameters[++next];
+  blocks.J_point = jacobian(next);
+  if (form.moves_lens) {
+    blocks.lens = parameters[++next];
+    blocks.J_lens = jacobian(next);
   }
-  if (blocks.J_center != nullptr) As<RowMatrix23>(blocks.J_center) = weight * J.by_center;
-  if (blocks.J_point != nullptr) As<RowMatrix23>(blocks.J_point) = weight * J.by_point;
-  if (blocks.J_lens != nullptr) {
-    J.by_lens.col(0) /= lens_scale;
-    As<RowMatrix23>(blocks.J_lens) = weight * J.by_lens;
-  }
-}
-
-constexpr double kOrigin[3] = {0.0, 0.0, 0.0};
-
-double* JacobianOf(double** jacobians, int block) {
-  return jacobians == nullptr ? nullptr : jacobians[block];
+  return blocks;
 }
 
 }  // namespace
-
-LensParameters LensOf(const Camera& camera, const Camera& calibrated) {
-  return {camera.fx / calibrated.fx, camera.distortion[0], camera.distortion[1]};
-}
-
-Camera WithLens(const Camera& camera, const LensParameters& lens) {
-  Camera result = camera;
-  result.fx *= lens[0];
-  result.fy *= lens[0];
-  result.distortion[0] = lens[1];
-  result.distortion[1] = lens[2];
-  const bool bends = lens[1] != 0.0 || lens[2] != 0.0;
-  if (bends && camera.model == CameraModel::kPinhole) result.model = CameraModel::kRadtan;
-  return result;
-}
 
 std::optional<Eigen::Vector2d> Reproject(const Camera& camera,
                                          const Eigen::Matrix3d& R_c_w,
@@ -146,135 +82,87 @@ std::optional<Eigen::Vector2d> Reproject(const Camera& camera,
   J->by_rotation.noalias() = -J_project * Skew(point_in_cam);
   J->by_point.noalias() = J_project * R_c_w;
   J->by_center = -J->by_point;
-  J->by_lens = LensJacobian(camera, point_in_cam, *pixel);
   return pixel;
 }
 
-bool LeftRotationManifold::Plus(const double* x, const double* delta, double* x_plus_delta) const {
-  const Eigen::Map<const Eigen::Quaterniond> q(x);
-  const Eigen::Map<const Eigen::Vector3d> rotation_vector(delta);
-  if (!rotation_vector.allFinite()) return false;
-  Eigen::Map<Eigen::Quaterniond> result(x_plus_delta);
-  result = (Rotation::Exp(rotation_vector).Quaternion() * q).normalized();
-  return true;
-}
-
-bool LeftRotationManifold::PlusJacobian(const double* x, double* jacobian) const {
-  As<RowMatrix43>(jacobian) = LeftJacobian(Eigen::Map<const Eigen::Quaterniond>(x));
-  return true;
-}
-
-bool LeftRotationManifold::Minus(const double* y, const double* x, double* y_minus_x) const {
-  const Eigen::Map<const Eigen::Quaterniond> q_y(y);
-  const Eigen::Map<const Eigen::Quaterniond> q_x(x);
-  As<Eigen::Vector3d>(y_minus_x) = Rotation(q_y * q_x.conjugate()).Log();
-  return true;
-}
-
-bool LeftRotationManifold::MinusJacobian(const double* x, double* jacobian) const {
-  As<RowMatrix34>(jacobian) = LeftInverseJacobian(Eigen::Map<const Eigen::Quaterniond>(x));
-  return true;
+ReprojectionCost::ReprojectionCost(const Camera& camera,
+                                   const Eigen::Vector2d& keypoint_px,
+                                   double sigma_px,
+                                   const ObservationForm& form)
+    : camera_(camera), keypoint_px_(keypoint_px), sigma_px_(sigma_px), form_(form) {
+  set_num_residuals(2);
+  std::vector<std::int32_t>& sizes = *mutable_parameter_block_sizes();
+  sizes.push_back(form.joint_pose ? kPoseSize : 4);
+  if (!form.joint_pose && !form.at_infinity) sizes.push_back(3);
+  sizes.push_back(3);
+  if (form.moves_lens) sizes.push_back(6);
 }
 
 bool ReprojectionCost::Evaluate(double const* const* parameters,
                                 double* residuals,
                                 double** jacobians) const {
-  EvaluateReprojection(camera_,
-                       1.0,
-                       keypoint_px_,
-                       sigma_px_,
-                       {parameters[0],
-                        parameters[1],
-                        parameters[2],
-                        JacobianOf(jacobians, 0),
-                        JacobianOf(jacobians, 1),
-                        JacobianOf(jacobians, 2)},
-                       residuals);
-  return true;
-}
-
-bool DirectionCost::Evaluate(double const* const* parameters,
-                             double* residuals,
-                             double** jacobians) const {
-  EvaluateReprojection(camera_,
-                       1.0,
-                       keypoint_px_,
-                       sigma_px_,
-                       {parameters[0],
-                        kOrigin,
-                        parameters[1],
-                        JacobianOf(jacobians, 0),
-                        nullptr,
-                        JacobianOf(jacobians, 1)},
-                       residuals);
-  return true;
-}
-
-bool LensReprojectionCost::Evaluate(double const* const* parameters,
-                                    double* residuals,
-                                    double** jacobians) const {
-  const Eigen::Map<const LensParameters> lens(parameters[3]);
-  EvaluateReprojection(WithLens(camera_, lens),
-                       lens[0],
-                       keypoint_px_,
-                       sigma_px_,
-                       {parameters[0],
-                        parameters[1],
-                        parameters[2],
-                        JacobianOf(jacobians, 0),
-                        JacobianOf(jacobians, 1),
-                        JacobianOf(jacobians, 2),
-                        JacobianOf(jacobians, 3)},
-                       residuals);
-  return true;
-}
-
-bool LensDirectionCost::Evaluate(double const* const* parameters,
-                                 double* residuals,
-                                 double** jacobians) const {
-  const Eigen::Map<const LensParameters> lens(parameters[2]);
-  EvaluateReprojection(WithLens(camera_, lens),
-                       lens[0],
-                       keypoint_px_,
-                       sigma_px_,
-                       {parameters[0],
-                        kOrigin,
-                        parameters[1],
-                        JacobianOf(jacobians, 0),
-                        nullptr,
-                        JacobianOf(jacobians, 1),
-                        JacobianOf(jacobians, 2)},
-                       residuals);
-  return true;
-}
-
-bool LensPriorCost::Evaluate(double const* const* parameters,
-                             double* residuals,
-                             double** jacobians) const {
-  const Eigen::Map<const LensParameters> lens(parameters[0]);
-  Eigen::Map<LensParameters> residual(residuals);
-  residual = (lens - expected_).cwiseQuotient(sigmas_);
-  if (jacobians != nullptr && jacobians[0] != nullptr) {
-    As<Eigen::Matrix<double, 3, 3, Eigen::RowMajor>>(jacobians[0]) =
-        sigmas_.cwiseInverse().asDiagonal();
+  const Blocks blocks = BlocksOf(form_, parameters, jacobians);
+  const Camera bent = form_.moves_lens
+                          ? WithLens(camera_, Eigen::Map<const LensParameters>(blocks.lens))
+                          : Camera();
+  const Camera& camera = form_.moves_lens ? bent : camera_;
+  const Eigen::Quaterniond q(blocks.quaternion);
+  const Eigen::Matrix3d R_c_w = q.normalized().toRotationMatrix();
+  const Eigen::Map<const Eigen::Vector3d> center(blocks.center);
+  const Eigen::Map<const Eigen::Vector3d> point(blocks.point);
+  const double weight = 1.0 / sigma_px_;
+  ReprojectionJacobian J;
+  const std::optional<Eigen::Vector2d> pixel =
+      Reproject(camera, R_c_w, center, point, blocks.WantJacobians() ? &J : nullptr);
+  if (!pixel) {
+    J.by_rotation.setZero();
+    J.by_center.setZero();
+    J.by_point.setZero();
+  }
+  Eigen::Map<Eigen::Vector2d> residual(residuals);
+  residual = pixel ? Eigen::Vector2d(weight * (*pixel - keypoint_px_))
+                   : Eigen::Vector2d::Constant(weight * kUnseenResidual_px);
+  if (blocks.J_quaternion != nullptr) {
+    Columns<4>(blocks.J_quaternion, blocks.quaternion_stride).noalias() =
+        weight * J.by_rotation * LeftInverseJacobian(q);
+  }
+  if (blocks.J_center != nullptr) {
+    if (form_.at_infinity) J.by_center.setZero();
+    Columns<3>(blocks.J_center, blocks.center_stride) = weight * J.by_center;
+  }
+  if (blocks.J_point != nullptr) Columns<3>(blocks.J_point, 3) = weight * J.by_point;
+  if (blocks.J_lens != nullptr) {
+    auto J_lens = Columns<6>(blocks.J_lens, 6);
+    if (pixel) {
+      J_lens = weight * LensJacobian(camera, camera_, R_c_w * (point - center), *pixel);
+    } else {
+      J_lens.setZero();
+    }
   }
   return true;
 }
 
 ScaleAnchorCost::ScaleAnchorCost(const Eigen::Vector3d& origin,
                                  const Eigen::Vector3d& start_center,
-                                 double weight)
+                                 double weight,
+                                 bool joint_pose)
     : origin_(origin),
       scaled_direction_((start_center - origin) / (start_center - origin).squaredNorm()),
-      weight_(weight) {}
+      weight_(weight),
+      offset_(joint_pose ? 4 : 0) {
+  set_num_residuals(1);
+  mutable_parameter_block_sizes()->push_back(joint_pose ? kPoseSize : 3);
+}
 
 bool ScaleAnchorCost::Evaluate(double const* const* parameters,
                                double* residuals,
                                double** jacobians) const {
-  const Eigen::Map<const Eigen::Vector3d> center(parameters[0]);
+  const Eigen::Map<const Eigen::Vector3d> center(parameters[0] + offset_);
   residuals[0] = weight_ * (scaled_direction_.dot(center - origin_) - 1.0);
   if (jacobians != nullptr && jacobians[0] != nullptr) {
-    As<Eigen::Vector3d>(jacobians[0]) = weight_ * scaled_direction_;
+    std::fill_n(jacobians[0], offset_, 0.0);
+    Eigen::Map<Eigen::Vector3d> J(jacobians[0] + offset_);
+    J = weight_ * scaled_direction_;
   }
   return true;
 }

@@ -1,9 +1,12 @@
 #pragma once
 
+#include <optional>
+
 #include <Eigen/Core>
-#include <ceres/manifold.h>
+#include <ceres/cost_function.h>
 #include <ceres/sized_cost_function.h>
 
+#include "ba/lens.h"
 #include "rotodom/camera/camera.h"
 
 namespace rotslam {
@@ -13,17 +16,7 @@ struct ReprojectionJacobian {
   Eigen::Matrix<double, 2, 3> by_rotation;  // px per rad of delta, Exp(delta) * cam_from_world
   Eigen::Matrix<double, 2, 3> by_center;    // px per world unit
   Eigen::Matrix<double, 2, 3> by_point;     // px per world unit
-  Eigen::Matrix<double, 2, 3> by_lens;      // px per unit of LensParameters
 };
-
-/// What refinement can change about a camera, as one parameter block: its focal length as a share
-/// of the one given, and the first two radial coefficients of its distortion.
-using LensParameters = Eigen::Vector3d;
-
-LensParameters LensOf(const Camera& camera, const Camera& calibrated);
-
-/// `camera` with that lens; a pinhole that gets a distortion becomes radtan.
-Camera WithLens(const Camera& camera, const LensParameters& lens);
 
 /// Pixel at which a camera sees a point; nullopt where the camera model does not reach.
 /// @param R_c_w  cam_from_world as a matrix.
@@ -35,31 +28,32 @@ std::optional<Eigen::Vector2d> Reproject(const Camera& camera,
                                          const Eigen::Vector3d& point_in_world,
                                          ReprojectionJacobian* J = nullptr);
 
-/// Unit quaternions (x, y, z, w) of cam_from_world under q -> Exp(delta) * q, delta in radians in
-/// the camera frame: the composition side of `Rotation`.
-class LeftRotationManifold final : public ceres::Manifold {
- public:
-  int AmbientSize() const override { return 4; }
-  int TangentSize() const override { return 3; }
-  bool Plus(const double* x, const double* delta, double* x_plus_delta) const override;
-  bool PlusJacobian(const double* x, double* jacobian) const override;
-  bool Minus(const double* y, const double* x, double* y_minus_x) const override;
-  bool MinusJacobian(const double* x, double* jacobian) const override;
-};
-
 /// Residual of a point the model cannot project (behind the camera, beyond the fold), per axis and
 /// in pixels, with zero derivative: a step that pushes a few bad points behind a camera costs
 /// something but is not refused for their sake, and they fall at the next classification.
 inline constexpr double kUnseenResidual_px = 1e3;
 
-/// (Project(R_c_w (point - center)) - keypoint_px) / sigma_px.
-/// Parameters: quaternion of cam_from_world (4, used as q / |q|), centre in the world (3), point in
-/// the world (3).
-class ReprojectionCost final : public ceres::SizedCostFunction<2, 4, 3, 3> {
+/// Which parameter blocks an observation has, in this order.
+struct ObservationForm {
+  // The pose as one block of seven (PoseManifold), or quaternion (4) and centre (3) apart, so that
+  // frames can share a centre.
+  bool joint_pose = true;
+  // The point (3) lies in a direction of any length, without depth: the centre does not count, and
+  // has no block where poses come apart. Such tracks are seen from one place only, but tell how the
+  // camera turned.
+  bool at_infinity = false;
+  // LensParameters (6) come last.
+  bool moves_lens = false;
+};
+
+/// (Project(R_c_w (point - center)) - keypoint_px) / sigma_px. Quaternions are used as q / |q|.
+class ReprojectionCost final : public ceres::CostFunction {
  public:
-  /// `camera` must outlive the cost function.
-  ReprojectionCost(const Camera& camera, const Eigen::Vector2d& keypoint_px, double sigma_px)
-      : camera_(camera), keypoint_px_(keypoint_px), sigma_px_(sigma_px) {}
+  /// @param camera  must outlive the cost function; where the lens moves, the calibrated one.
+  ReprojectionCost(const Camera& camera,
+                   const Eigen::Vector2d& keypoint_px,
+                   double sigma_px,
+                   const ObservationForm& form = {});
   bool Evaluate(double const* const* parameters,
                 double* residuals,
                 double** jacobians) const override;
@@ -68,81 +62,20 @@ class ReprojectionCost final : public ceres::SizedCostFunction<2, 4, 3, 3> {
   const Camera& camera_;
   Eigen::Vector2d keypoint_px_;
   double sigma_px_;
-};
-
-/// (Project(R_c_w direction) - keypoint_px) / sigma_px, for tracks seen from one place only: they
-/// have no depth, but tell how the camera turned.
-/// Parameters: quaternion of cam_from_world (4), direction in the world (3, length free).
-class DirectionCost final : public ceres::SizedCostFunction<2, 4, 3> {
- public:
-  /// `camera` must outlive the cost function.
-  DirectionCost(const Camera& camera, const Eigen::Vector2d& keypoint_px, double sigma_px)
-      : camera_(camera), keypoint_px_(keypoint_px), sigma_px_(sigma_px) {}
-  bool Evaluate(double const* const* parameters,
-                double* residuals,
-                double** jacobians) const override;
-
- private:
-  const Camera& camera_;
-  Eigen::Vector2d keypoint_px_;
-  double sigma_px_;
-};
-
-/// The same two with a lens that moves too: LensParameters (3) come last among the parameters.
-class LensReprojectionCost final : public ceres::SizedCostFunction<2, 4, 3, 3, 3> {
- public:
-  /// `camera`, whose lens is replaced, must outlive the cost function.
-  LensReprojectionCost(const Camera& camera, const Eigen::Vector2d& keypoint_px, double sigma_px)
-      : camera_(camera), keypoint_px_(keypoint_px), sigma_px_(sigma_px) {}
-  bool Evaluate(double const* const* parameters,
-                double* residuals,
-                double** jacobians) const override;
-
- private:
-  const Camera& camera_;
-  Eigen::Vector2d keypoint_px_;
-  double sigma_px_;
-};
-
-class LensDirectionCost final : public ceres::SizedCostFunction<2, 4, 3, 3> {
- public:
-  /// `camera`, whose lens is replaced, must outlive the cost function.
-  LensDirectionCost(const Camera& camera, const Eigen::Vector2d& keypoint_px, double sigma_px)
-      : camera_(camera), keypoint_px_(keypoint_px), sigma_px_(sigma_px) {}
-  bool Evaluate(double const* const* parameters,
-                double* residuals,
-                double** jacobians) const override;
-
- private:
-  const Camera& camera_;
-  Eigen::Vector2d keypoint_px_;
-  double sigma_px_;
-};
-
-/// (lens - expected) / sigma: what the calibration says.
-class LensPriorCost final : public ceres::SizedCostFunction<3, 3> {
- public:
-  /// @param sigmas  positive.
-  LensPriorCost(const LensParameters& expected, const LensParameters& sigmas)
-      : expected_(expected), sigmas_(sigmas) {}
-  bool Evaluate(double const* const* parameters,
-                double* residuals,
-                double** jacobians) const override;
-
- private:
-  LensParameters expected_;
-  LensParameters sigmas_;
+  ObservationForm form_;
 };
 
 /// weight * (direction . (center - origin) / length - 1): keeps one coordinate of one centre, and
 /// with it the scale of everything. Scale is free otherwise, so the residual is zero at the optimum
 /// and moves nothing there; unlike a smaller parameter block it leaves all camera blocks the same
 /// size, which is what Ceres' specialised Schur elimination asks for.
-class ScaleAnchorCost final : public ceres::SizedCostFunction<1, 3> {
+class ScaleAnchorCost final : public ceres::CostFunction {
  public:
+  /// @param joint_pose  the block is a pose of seven, not a centre.
   ScaleAnchorCost(const Eigen::Vector3d& origin,
                   const Eigen::Vector3d& start_center,
-                  double weight);
+                  double weight,
+                  bool joint_pose);
   bool Evaluate(double const* const* parameters,
                 double* residuals,
                 double** jacobians) const override;
@@ -151,6 +84,7 @@ class ScaleAnchorCost final : public ceres::SizedCostFunction<1, 3> {
   Eigen::Vector3d origin_;
   Eigen::Vector3d scaled_direction_;  // direction / length
   double weight_;
+  int offset_;  // of the centre in its block
 };
 
 }  // namespace rotslam

@@ -6,6 +6,7 @@
 #include <utility>
 
 #include "krot/growth.h"
+#include "krot/linear_start.h"
 #include "krot/named_problem.h"
 #include "krot/selection.h"
 
@@ -67,7 +68,7 @@ std::optional<ComponentStart> SolvePrograms(const RotationMap& cam_from_world,
   const MinimaxProblem survivors = Survivors(named.problem, robust.residuals, 1.001 * units.gamma);
   if (survivors.observations.empty()) return std::nullopt;
   std::optional<MinimaxStructure> structure = std::move(robust.structure);
-  if (options.start == "linear") structure = SolveLinearStart(survivors, options.linear_start);
+  if (options.start == "linear") structure = SolveLinearStart(survivors);
   if (!structure) return std::nullopt;
   ComponentStart start;
   start.num_programs = robust.num_programs;

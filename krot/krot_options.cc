@@ -40,7 +40,6 @@ std::optional<std::string> KrotOptions::Problem() const {
   }
   if (num_threads < 1) return OutOfRange("num_threads", num_threads, "at least 1");
   if (const auto trouble = robust_start.Problem()) return "robust_start." + *trouble;
-  if (const auto trouble = linear_start.Problem()) return "linear_start." + *trouble;
   if (const auto trouble = bisection.Problem()) return "bisection." + *trouble;
   return std::nullopt;
 }

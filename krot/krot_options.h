@@ -5,7 +5,6 @@
 #include <string>
 
 #include "krot/bisection.h"
-#include "krot/linear_start.h"
 #include "krot/robust_start.h"
 #include "rotodom/camera/camera.h"
 
@@ -49,7 +48,6 @@ struct KrotOptions {
   // out of the linear programs (they are triangulated all the same).
   double max_off_axis_deg = 80.0;
   RobustStartOptions robust_start;
-  LinearStartOptions linear_start;
   BisectionOptions bisection;
   std::uint64_t seed = 1;
   int num_threads = 1;
@@ -72,7 +70,6 @@ struct KrotOptions {
     visit("use_epipolar_filter", use_epipolar_filter);
     visit("max_off_axis_deg", max_off_axis_deg);
     visit("robust_start", robust_start);
-    visit("linear_start", linear_start);
     visit("bisection", bisection);
     visit("seed", seed);
   }

@@ -1,22 +1,17 @@
 #include "krot/linear_start.h"
 
-#include <algorithm>
 #include <array>
 #include <cmath>
-#include <stdexcept>
 #include <vector>
 
 #include <Eigen/Geometry>
 #include <Eigen/SparseCholesky>
 
-#include "rotodom/types/options.h"
 #include "rotodom/types/rotation.h"
 
 namespace rotslam {
 namespace {
 
-// Weight left to a ray that points away from its point.
-constexpr double kBehindWeight = 1e-3;
 // Sine of the angle below which two rays give no depth.
 constexpr double kMinSine = 1e-6;
 constexpr int kInverseIterations = 30;
@@ -25,8 +20,6 @@ constexpr int kInverseIterations = 30;
 struct Ray {
   int view = 0;
   Eigen::Vector3d direction;  // unit, world axes
-  double weight = 1.0;
-  double distance = 0.0;  // of the point from the view, as the round before has it; 0: not known
 };
 
 // A point on `left`'s ray, at the depth where `right`'s passes closest:
@@ -41,13 +34,10 @@ struct Base {
 // The two rays that tell the depth best.
 Base ChooseBase(const std::vector<Ray>& rays) {
   Base base;
-  double best = 0.0;
   for (int a = 0; a < static_cast<int>(rays.size()); ++a) {
     for (int b = a + 1; b < static_cast<int>(rays.size()); ++b) {
       const double sine = rays[a].direction.cross(rays[b].direction).norm();
-      const double score = sine * rays[a].weight * rays[b].weight;
-      if (!(sine > kMinSine) || !(score > best)) continue;
-      best = score;
+      if (!(sine > kMinSine) || !(sine > base.sine)) continue;
       base.left = a;
       base.right = b;
       base.sine = sine;
@@ -61,8 +51,8 @@ Base ChooseBase(const std::vector<Ray>& rays) {
 
 class LinearStart {
  public:
-  LinearStart(const MinimaxProblem& problem, const LinearStartOptions& options)
-      : options_(options), num_views_(problem.num_views()), rays_of_(problem.num_points) {
+  explicit LinearStart(const MinimaxProblem& problem)
+      : num_views_(problem.num_views()), rays_of_(problem.num_points) {
     for (const ImageObservation& observation : problem.observations) {
       Ray ray;
       ray.view = observation.view;
@@ -70,17 +60,13 @@ class LinearStart {
           problem.R_c_w[observation.view].transpose() * observation.xy.homogeneous().normalized();
       rays_of_[observation.point].push_back(ray);
     }
+    bases_.reserve(rays_of_.size());
+    for (const std::vector<Ray>& rays : rays_of_) bases_.push_back(ChooseBase(rays));
   }
 
   std::optional<MinimaxStructure> Solve() {
-    for (int round = 0; round < options_.max_rounds; ++round) {
-      bases_.clear();
-      bases_.reserve(rays_of_.size());
-      for (const std::vector<Ray>& rays : rays_of_) bases_.push_back(ChooseBase(rays));
-      if (!SolveCenters()) return std::nullopt;
-      PlacePoints();
-      Reweight();
-    }
+    if (!SolveCenters()) return std::nullopt;
+    PlacePoints();
     return std::move(structure_);
   }
 
@@ -96,8 +82,8 @@ class LinearStart {
     for (int k = 0; k < static_cast<int>(rays.size()); ++k) {
       if (k == base.left) continue;
       const Ray& ray = rays[k];
-      const double scale = base.sine / (ray.distance > 0.0 ? ray.distance : 1.0);
-      const double weight = scale * scale * ray.weight * std::min(left.weight, right.weight);
+      // Taken out again what ChooseBase's depth has divided by.
+      const double weight = base.sine * base.sine;
       const Eigen::Matrix3d cross = Skew(ray.direction);
       const std::array<int, 3> views = {left.view, right.view, ray.view};
       const std::array<Eigen::Matrix3d, 3> J = {
@@ -172,21 +158,6 @@ class LinearStart {
     for (Eigen::Vector3d& point : structure_.point_in_world) point = -point;
   }
 
-  void Reweight() {
-    for (std::size_t i = 0; i < rays_of_.size(); ++i) {
-      if (bases_[i].left < 0) continue;
-      for (Ray& ray : rays_of_[i]) {
-        const Eigen::Vector3d towards =
-            structure_.point_in_world[i] - structure_.center_in_world[ray.view];
-        ray.distance = towards.norm();
-        const double sine = ray.direction.cross(towards).norm() / std::max(ray.distance, 1e-300);
-        const double error = sine / options_.scale_rad;
-        ray.weight = ray.direction.dot(towards) > 0.0 ? 1.0 / (1.0 + error * error) : kBehindWeight;
-      }
-    }
-  }
-
-  const LinearStartOptions& options_;
   int num_views_;
   std::vector<std::vector<Ray>> rays_of_;  // by point
   std::vector<Base> bases_;                // by point
@@ -195,20 +166,10 @@ class LinearStart {
 
 }  // namespace
 
-std::optional<std::string> LinearStartOptions::Problem() const {
-  if (max_rounds < 1) return OutOfRange("max_rounds", max_rounds, "at least 1");
-  if (!(scale_rad > 0.0)) return OutOfRange("scale_rad", scale_rad, "above 0");
-  return std::nullopt;
-}
-
-std::optional<MinimaxStructure> SolveLinearStart(const MinimaxProblem& problem,
-                                                 const LinearStartOptions& options) {
-  if (const auto trouble = options.Problem()) {
-    throw std::invalid_argument("LinearStartOptions: " + *trouble);
-  }
+std::optional<MinimaxStructure> SolveLinearStart(const MinimaxProblem& problem) {
   CheckProblem(problem);
   if (problem.num_views() < 2) return std::nullopt;
-  return LinearStart(problem, options).Solve();
+  return LinearStart(problem).Solve();
 }
 
 }  // namespace rotslam

@@ -3,6 +3,8 @@
 #include <ceres/manifold_test_utils.h>
 #include <gtest/gtest.h>
 
+#include "ba/lens.h"
+#include "ba/pose_manifold.h"
 #include "rotodom/types/rotation.h"
 #include "tests/ba/ba_scene.h"
 
@@ -81,43 +83,58 @@ TEST_P(ReprojectionForEveryCamera, JacobiansOfCostsEqualCentralDifferences) {
   const Camera camera = BaCamera(GetParam());
   const Eigen::Vector4d q = Rotation::Exp({0.3, -0.2, 0.1}).Quaternion().coeffs();
   const std::vector<double> quaternion(q.data(), q.data() + 4);
-  ExpectJacobiansAgree(ReprojectionCost(camera, {600.0, 200.0}, 0.7),
-                       {quaternion, {0.4, -0.3, 0.2}, {1.1, -0.7, 4.0}});
-  ExpectJacobiansAgree(DirectionCost(camera, {600.0, 200.0}, 1.3), {quaternion, {0.4, -0.3, 2.0}});
-  const std::vector<double> lens = {1.02, -0.05, 0.03};
-  ExpectJacobiansAgree(LensReprojectionCost(camera, {600.0, 200.0}, 0.7),
-                       {quaternion, {0.4, -0.3, 0.2}, {1.1, -0.7, 4.0}, lens});
-  ExpectJacobiansAgree(LensDirectionCost(camera, {600.0, 200.0}, 1.3),
-                       {quaternion, {0.4, -0.3, 2.0}, lens});
+  std::vector<double> pose = quaternion;
+  pose.insert(pose.end(), {0.4, -0.3, 0.2});
+  const std::vector<double> center = {0.4, -0.3, 0.2};
+  const std::vector<double> point = {1.1, -0.7, 4.0};
+  const std::vector<double> lens = {1.02, 0.99, 0.01, -0.02, -0.05, 0.03};
+  for (const bool moves_lens : {false, true}) {
+    for (const bool at_infinity : {false, true}) {
+      for (const bool joint_pose : {false, true}) {
+        std::vector<std::vector<double>> blocks = {joint_pose ? pose : quaternion};
+        if (!joint_pose && !at_infinity) blocks.push_back(center);
+        blocks.push_back(point);
+        if (moves_lens) blocks.push_back(lens);
+        const ObservationForm form = {joint_pose, at_infinity, moves_lens};
+        ExpectJacobiansAgree(ReprojectionCost(camera, {600.0, 200.0}, 0.7, form), blocks);
+      }
+    }
+  }
 }
 
 TEST(LensPriorCost, IsZeroAtWhatIsExpectedAndItsJacobianEqualsCentralDifferences) {
-  const LensPriorCost cost({1.0, -0.1, 0.02}, {0.003, 0.005, 0.1});
-  const double expected[3] = {1.0, -0.1, 0.02};
+  const double expected[6] = {1.0, 1.0, 0.01, -0.01, -0.1, 0.02};
+  LensParameters sigmas;
+  sigmas << 0.003, 0.001, 0.002, 0.002, 0.005, 0.1;
+  const LensPriorCost cost(Eigen::Map<const LensParameters>(expected), sigmas);
   const double* parameters[1] = {expected};
-  double residuals[3];
+  double residuals[6];
   ASSERT_TRUE(cost.Evaluate(parameters, residuals, nullptr));
   for (const double residual : residuals) EXPECT_EQ(residual, 0.0);
-  ExpectJacobiansAgree(cost, {{1.01, -0.09, 0.0}});
+  ExpectJacobiansAgree(cost, {{1.01, 1.0, 0.0, 0.1, -0.09, 0.0}});
 }
 
 TEST(WithLens, UndoesLensOfAndTurnsAPinholeIntoRadtanOnlyWhereItBends) {
   const Camera pinhole = BaCamera();
   EXPECT_EQ(WithLens(pinhole, LensOf(pinhole, pinhole)), pinhole);
-  const Camera bent = WithLens(pinhole, {1.01, 0.02, -0.01});
+  LensParameters lens;
+  lens << 1.01, 0.99, 0.003, -0.004, 0.02, -0.01;
+  const Camera bent = WithLens(pinhole, lens);
   EXPECT_EQ(bent.model, CameraModel::kRadtan);
   EXPECT_FALSE(bent.Problem());
-  EXPECT_LT((LensOf(bent, pinhole) - LensParameters(1.01, 0.02, -0.01)).norm(), 1e-15);
+  EXPECT_LT((LensOf(bent, pinhole) - lens).norm(), 1e-14);
 }
 
 TEST(ScaleAnchorCost, IsZeroAtTheStartAndItsJacobianEqualsCentralDifferences) {
-  const ScaleAnchorCost cost({1.0, 2.0, 3.0}, {4.0, 6.0, 3.5}, 100.0);
+  const ScaleAnchorCost cost({1.0, 2.0, 3.0}, {4.0, 6.0, 3.5}, 100.0, false);
   const double start[3] = {4.0, 6.0, 3.5};
   const double* parameters[1] = {start};
   double residual = 1.0;
   ASSERT_TRUE(cost.Evaluate(parameters, &residual, nullptr));
   EXPECT_NEAR(residual, 0.0, 1e-12);
   ExpectJacobiansAgree(cost, {{3.0, 5.0, 2.0}});
+  ExpectJacobiansAgree(ScaleAnchorCost({1.0, 2.0, 3.0}, {4.0, 6.0, 3.5}, 100.0, true),
+                       {{0.1, 0.2, 0.3, 0.9, 3.0, 5.0, 2.0}});
 }
 
 TEST(LeftRotationManifold, KeepsCeresLawsOfAManifold) {
@@ -131,6 +148,27 @@ TEST(LeftRotationManifold, KeepsCeresLawsOfAManifold) {
   EXPECT_THAT_MANIFOLD_INVARIANTS_HOLD(manifold, x, delta, y, 1e-6);
 }
 
+TEST(PoseManifold, KeepsCeresLawsOfAManifold) {
+  using namespace ceres;  // the macro below names its matchers without it
+  Eigen::VectorXd x(7);
+  x << Rotation::Exp({0.5, -1.2, 0.3}).Quaternion().coeffs(), 1.0, -2.0, 3.0;
+  Eigen::VectorXd y(7);
+  y << Rotation::Exp({0.2, -0.9, 0.8}).Quaternion().coeffs(), 0.5, 1.0, 2.0;
+  Eigen::VectorXd delta(6);
+  delta << 0.1, -0.05, 0.2, 1.0, -1.0, 0.5;
+  EXPECT_THAT_MANIFOLD_INVARIANTS_HOLD(PoseManifold(), x, delta, y, 1e-6);
+}
+
+TEST(CenterManifold, KeepsCeresLawsOfAManifold) {
+  using namespace ceres;  // the macro below names its matchers without it
+  Eigen::VectorXd x(7);
+  x << Rotation::Exp({0.5, -1.2, 0.3}).Quaternion().coeffs(), 1.0, -2.0, 3.0;
+  Eigen::VectorXd y = x;
+  y.tail<3>() << 0.5, 1.0, 2.0;
+  const Eigen::VectorXd delta = Eigen::Vector3d(1.0, -1.0, 0.5);
+  EXPECT_THAT_MANIFOLD_INVARIANTS_HOLD(CenterManifold(), x, delta, y, 1e-6);
+}
+
 TEST(LeftRotationManifold, ComposesOnTheLeftAsRotationDoes) {
   const Rotation start = Rotation::Exp({0.5, -1.2, 0.3});
   const Eigen::Vector3d delta(0.1, -0.05, 0.2);
@@ -142,7 +180,7 @@ TEST(LeftRotationManifold, ComposesOnTheLeftAsRotationDoes) {
 
 TEST(ReprojectionCost, PointBehindTheCameraCostsButDoesNotPull) {
   const Camera camera = BaCamera();
-  const ReprojectionCost cost(camera, {600.0, 200.0}, 2.0);
+  const ReprojectionCost cost(camera, {600.0, 200.0}, 2.0, {.joint_pose = false});
   const double q[4] = {0.0, 0.0, 0.0, 1.0};
   const double center[3] = {0.0, 0.0, 0.0};
   const double point[3] = {0.1, 0.2, -3.0};

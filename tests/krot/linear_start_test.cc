@@ -1,7 +1,5 @@
 #include "krot/linear_start.h"
 
-#include <stdexcept>
-
 #include <gtest/gtest.h>
 
 #include "tests/krot/problem_from_scene.h"
@@ -53,14 +51,11 @@ TEST(SolveLinearStart, StaysNearTheTruthUnderNoise) {
   }
 }
 
-TEST(SolveLinearStart, SaysNoWithoutParallaxAndRefusesBadOptions) {
+TEST(SolveLinearStart, SaysNoWithoutParallax) {
   SceneOptions options;
   options.path = ScenePath::kPivot;
   EXPECT_FALSE(SolveLinearStart(ProblemFromScene(MakeScene(options))));
   EXPECT_FALSE(SolveLinearStart({}));
-  LinearStartOptions bad;
-  bad.max_rounds = 0;
-  EXPECT_THROW(SolveLinearStart({}, bad), std::invalid_argument);
 }
 
 }  // namespace
