@@ -94,11 +94,11 @@ class Search {
         step_ratio_(StepRatios(num_frames, edges_, options.max_edge_span)) {}
 
   std::vector<Run> FindRuns() const {
-    std::vector<Run> runs = RunsOf({0, num_frames_ - 1}, [&](int n) {
+    const std::vector<Run> runs = RunsOf({0, num_frames_ - 1}, [&](int n) {
       return step_ratio_[n] >= options_.min_rotation_only_ratio;
     });
     std::vector<Run> pieces;
-    for (const Run& run : Joined(std::move(runs))) {
+    for (const Run& run : Joined(runs)) {
       for (const Run& piece : Checked(run)) {
         if (piece.NumFrames() >= options_.min_frames) pieces.push_back(piece);
       }
@@ -136,7 +136,7 @@ class Search {
   }
 
   // Runs over whose gaps direct edges see no baseline.
-  std::vector<Run> Joined(std::vector<Run> runs) const {
+  std::vector<Run> Joined(const std::vector<Run>& runs) const {
     std::vector<Run> joined;
     for (const Run& run : runs) {
       if (!joined.empty() && run.first - joined.back().last <= options_.max_gap &&
@@ -171,7 +171,7 @@ class Search {
         steps[n].Add(edge.measurement->rotation_only);
       }
     }
-    const std::vector<Run> parts =
+    std::vector<Run> parts =
         RunsOf(run, [&](int n) { return steps[n].edges < kEnough || Holds(steps[n]); });
     if (parts.size() == 1 && parts.front().NumFrames() == run.NumFrames()) return parts;
     std::vector<Run> pieces;
