@@ -38,6 +38,7 @@ void AddSimulateCommand(CLI::App& app, Action& action);
 void AddAverageCommand(CLI::App& app, Action& action);
 void AddEvalCommand(CLI::App& app, Action& action);
 void AddExportCommand(CLI::App& app, Action& action);
+void AddPanoramaCommand(CLI::App& app, Action& action);
 void AddVocabularyCommand(CLI::App& app, Action& action);
 
 }  // namespace rotslam

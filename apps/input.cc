@@ -1,5 +1,6 @@
 #include "apps/input.h"
 
+#include <filesystem>
 #include <stdexcept>
 
 #include "rotodom/camera/read_camera.h"
@@ -53,6 +54,7 @@ Input OpenInput(const InputFlags& flags,
                 const SequenceOptions& options,
                 const std::function<void(const std::string&)>& tell) {
   Input input;
+  input.path = std::filesystem::absolute(flags.sequence).lexically_normal().string();
   input.sequence = OpenSequence(flags.sequence, options);
   tell("input:  " + input.sequence->Describe());
   if (!flags.camera.empty()) {

@@ -34,6 +34,7 @@ struct InputFlags {
 void AddInputFlags(CLI::App& command, InputFlags& flags);
 
 struct Input {
+  std::string path;  // of the sequence, absolute
   std::unique_ptr<Sequence> sequence;
   Camera camera;  // with the size of the images
   std::string camera_file;

@@ -60,6 +60,7 @@ int main(int argc, char** argv) {
     rotslam::AddAverageCommand(app, action);
     rotslam::AddEvalCommand(app, action);
     rotslam::AddSimulateCommand(app, action);
+    rotslam::AddPanoramaCommand(app, action);
     rotslam::AddVocabularyCommand(app, action);
     try {
       app.parse(argc, argv);

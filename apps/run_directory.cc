@@ -30,39 +30,63 @@ int ComponentAt(const std::vector<MapComponent>& components, int frame) {
   return found;
 }
 
-// Held stretches are `rotating`; what lies between them, cut where a component of the map begins,
-// `translating`.
-std::vector<Segment> Segments(const PositionResult& positions) {
-  const int num_frames = static_cast<int>(positions.cam_from_world.size());
-  std::set<int> starts = {0};
-  std::map<int, const HeldStretch*> held_from;
-  for (const HeldStretch& stretch : positions.held) {
-    starts.insert({stretch.first.value, stretch.last.value + 1});
-    held_from[stretch.first.value] = &stretch;
-  }
-  for (const MapComponent& component : positions.components) {
-    const int first = component.keyframes.begin()->value;
-    const bool inside =
-        std::any_of(positions.held.begin(), positions.held.end(), [&](const HeldStretch& stretch) {
-          return stretch.first.value <= first && first <= stretch.last.value;
-        });
-    if (!inside) starts.insert(first);
-  }
-  starts.erase(starts.lower_bound(num_frames), starts.end());
+// What a frame belongs to: its stretch, or -1, and the way it moves there.
+struct FrameMotion {
+  int stretch = -1;
+  const char* kind = "translating";
 
+  bool operator==(const FrameMotion& other) const = default;
+};
+
+std::vector<FrameMotion> MotionOfFrames(const PositionResult& positions) {
+  std::vector<FrameMotion> motions(positions.cam_from_world.size());
+  for (int k = 0; k < std::ssize(positions.held); ++k) {
+    const HeldStretch& stretch = positions.held[k];
+    for (int n = stretch.first.value; n <= stretch.last.value; ++n) motions[n] = {k, "rotating"};
+    for (const FrameRange& still : stretch.still) {
+      for (int n = still.first.value; n <= still.last.value; ++n) motions[n].kind = "still";
+    }
+  }
+  return motions;
+}
+
+// How the scale of a segment's component is known. Behind a stretch that only turns the same
+// component goes on where its tracks, or a loop, reach across.
+std::string ScaleOf(const PositionResult& positions, int component, int first_frame) {
+  if (component < 0) return "none";
+  const MapComponent& part = positions.components[component];
+  if (part.placed_by_default) return "continuity";
+  const auto held_before =
+      std::find_if(positions.held.rbegin(), positions.held.rend(), [&](const HeldStretch& stretch) {
+        return stretch.last.value < first_frame;
+      });
+  const bool is_tied =
+      held_before != positions.held.rend() && *part.keyframes.begin() < held_before->first;
+  return is_tied ? "tracks" : "reference";
+}
+
+// Cut where the kind of motion changes and, outside of held stretches, where a component of the map
+// begins.
+std::vector<Segment> Segments(const PositionResult& positions) {
+  const std::vector<FrameMotion> motions = MotionOfFrames(positions);
+  std::set<int> component_starts;
+  for (const MapComponent& component : positions.components) {
+    component_starts.insert(component.keyframes.begin()->value);
+  }
   std::vector<Segment> segments;
-  for (auto start = starts.begin(); start != starts.end(); ++start) {
-    Segment segment;
-    segment.first_frame = *start;
-    segment.last_frame = (std::next(start) == starts.end() ? num_frames : *std::next(start)) - 1;
-    const auto held = held_from.find(*start);
-    segment.kind = held == held_from.end() ? "translating" : "rotating";
-    segment.evidence = held == held_from.end() ? 0.0 : held->second->evidence;
-    segment.component = ComponentAt(positions.components, *start);
-    segment.scale = segment.component < 0                                       ? "none"
-                    : positions.components[segment.component].placed_by_default ? "continuity"
-                                                                                : "reference";
-    segments.push_back(segment);
+  for (int n = 0; n < std::ssize(motions); ++n) {
+    const bool begins = n == 0 || motions[n] != motions[n - 1] ||
+                        (motions[n].stretch < 0 && component_starts.contains(n));
+    if (begins) {
+      Segment& segment = segments.emplace_back();
+      segment.first_frame = n;
+      segment.kind = motions[n].kind;
+      const int stretch = motions[n].stretch;
+      segment.evidence = stretch < 0 ? 0.0 : positions.held[stretch].evidence;
+      segment.component = ComponentAt(positions.components, n);
+      segment.scale = ScaleOf(positions, segment.component, n);
+    }
+    segments.back().last_frame = n;
   }
   return segments;
 }
@@ -194,6 +218,7 @@ RunSummary StartSummary(const std::string& command,
   summary.camera = input.camera;
   const auto count = [](std::size_t value) { return static_cast<std::int64_t>(value); };
   summary.sequence = {{"description", input.sequence->Describe()},
+                      {"path", input.path},
                       {"camera_file", input.camera_file},
                       {"first_timestamp_s", orientations.timestamps_s.front()},
                       {"last_timestamp_s", orientations.timestamps_s.back()}};

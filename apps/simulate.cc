@@ -17,6 +17,7 @@ struct SimulateFlags {
   CommonFlags common;
   SimulationOptions simulation;
   std::string kind;
+  std::string turn_axis = Name(TurnAxis::kYaw);
   std::string out;
   std::string layout = "tum";
   std::string camera;
@@ -56,6 +57,9 @@ int Simulate(const SimulateFlags& flags) {
   for (const SimulationKind kind :
        {SimulationKind::kGimbal, SimulationKind::kHandheld, SimulationKind::kStreet}) {
     if (flags.kind == Name(kind)) options.kind = kind;
+  }
+  for (const TurnAxis axis : {TurnAxis::kYaw, TurnAxis::kPitch, TurnAxis::kRoll}) {
+    if (flags.turn_axis == Name(axis)) options.turn_axis = axis;
   }
   options.camera = CameraOf(flags);
   const Simulation simulation(options);
@@ -109,6 +113,9 @@ void AddSimulateCommand(CLI::App& app, Action& action) {
       ->add_option("--speed-scale",
                    simulation.speed_scale,
                    "The same way in fewer (> 1) or more (< 1) frames")
+      ->capture_default_str();
+  command->add_option("--turn-axis", flags->turn_axis, "gimbal: turn about yaw, pitch or roll")
+      ->check(CLI::IsMember({"yaw", "pitch", "roll"}))
       ->capture_default_str();
   command->add_option("--turn-deg", simulation.turn_deg, "gimbal: angle turned in place")
       ->capture_default_str();

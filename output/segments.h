@@ -9,10 +9,12 @@ namespace rotslam {
 /// A stretch of frames of one kind of motion.
 struct Segment {
   int first_frame = 0;
-  int last_frame = 0;     // inclusive
-  std::string kind;       // translating, rotating or still
-  int component = -1;     // part of the map whose scale is one; -1 where there is no map
-  std::string scale;      // how it is tied to the rest: reference, continuity (by default) or none
+  int last_frame = 0;  // inclusive
+  std::string kind;    // translating, rotating or still
+  int component = -1;  // part of the map whose scale is one; -1 where there is no map
+  // How its scale is tied to the rest: reference (it is the scale), tracks (points seen before and
+  // after a turn in place), continuity (by default, nothing measures it) or none (no map).
+  std::string scale;
   double evidence = 0.0;  // share of its edges that show no baseline
 };
 

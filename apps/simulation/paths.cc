@@ -47,6 +47,18 @@ const char* Name(MotionKind kind) {
   return kind == MotionKind::kRotating ? "rotating" : "translating";
 }
 
+const char* Name(TurnAxis axis) {
+  switch (axis) {
+    case TurnAxis::kYaw:
+      return "yaw";
+    case TurnAxis::kPitch:
+      return "pitch";
+    case TurnAxis::kRoll:
+      return "roll";
+  }
+  return "";
+}
+
 CameraPath HandheldPath(const HandheldPathOptions& options) {
   double phase[6];
   for (int k = 0; k < 6; ++k) {
@@ -91,13 +103,18 @@ CameraPath GimbalPath(const GimbalPathOptions& options) {
                     {first_turning, last_turning, MotionKind::kRotating},
                     {last_turning + 1, num_frames - 1, MotionKind::kTranslating}};
   const double yaw_before = 0.12;
-  const double turn = options.turn_deg * kRadFromDeg;
+  const auto turn_about = [&](TurnAxis axis) {
+    return options.axis == axis ? options.turn_deg * kRadFromDeg : 0.0;
+  };
+  const double yaw_turn = turn_about(TurnAxis::kYaw);
+  const double pitch_turn = turn_about(TurnAxis::kPitch);
+  const double roll_turn = turn_about(TurnAxis::kRoll);
   const double arm = options.lever_arm_m;
   path.at = [=](double time_s) {
     const Vector3d start(-1.05, -1.62, -0.55);
     const Vector3d stop(0.15, -1.5, -0.3);
     // Onwards across the new view, backing off a little, over the same length at any turn.
-    const double yaw_after = yaw_before + turn;
+    const double yaw_after = yaw_before + yaw_turn;
     const Vector3d onwards = 0.95 * Vector3d(std::cos(yaw_after), 0.0, -std::sin(yaw_after)) -
                              0.30 * Vector3d(std::sin(yaw_after), 0.0, std::cos(yaw_after)) +
                              Vector3d(0.0, -0.1, 0.0);
@@ -125,7 +142,10 @@ CameraPath GimbalPath(const GimbalPathOptions& options) {
       roll += 0.03 * calm * std::sin(kTwoPi * 0.5 * time_s + 2.0);
     } else {
       const double x = (time_s - stop_s) / (go_s - stop_s);
-      yaw += turn * RampedStep(x, 0.25);
+      const double turned = RampedStep(x, 0.25);
+      yaw += yaw_turn * turned;
+      pitch += pitch_turn * turned;
+      roll += roll_turn * turned;
       pitch += 0.10 * (SmoothStep(x / 0.5) - SmoothStep(x / 0.5 - 1.0));
       roll += 0.05 * (SmoothStep(x / 0.4) - SmoothStep((x - 0.6) / 0.4));
     }

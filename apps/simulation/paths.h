@@ -40,9 +40,16 @@ struct HandheldPathOptions {
 /// sums of sinusoids, smooth to any order.
 CameraPath HandheldPath(const HandheldPathOptions& options);
 
+/// What a camera turns about: its vertical, its horizontal or its optical axis.
+enum class TurnAxis { kYaw, kPitch, kRoll };
+
+/// `yaw`, `pitch` or `roll`.
+const char* Name(TurnAxis axis);
+
 struct GimbalPathOptions {
   int num_frames = 120;
   double fps = 30.0;
+  TurnAxis axis = TurnAxis::kYaw;
   double turn_deg = 120.0;   // between the views of the two translating stretches
   double lever_arm_m = 0.0;  // from the axis of the turn forward to the camera's centre
 };

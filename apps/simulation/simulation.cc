@@ -22,6 +22,7 @@ CameraPath MakePath(const SimulationOptions& options) {
               ? options.frames
               : std::max(10,
                          static_cast<int>(std::lround(gimbal.num_frames / options.speed_scale)));
+      gimbal.axis = options.turn_axis;
       gimbal.turn_deg = options.turn_deg;
       gimbal.lever_arm_m = options.lever_arm_m;
       return GimbalPath(gimbal);

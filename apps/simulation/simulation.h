@@ -34,9 +34,10 @@ struct SimulationOptions {
   // number, timestamp and picture whatever the range.
   int first = 0;
   int last = -1;
-  double fps = 0.0;          // frames a second; 0: 30 in the room, 10 in the street
-  double speed_scale = 1.0;  // the same way in fewer (> 1) or more (< 1) frames
-  double turn_deg = 120.0;   // gimbal: angle turned in place; negative turns left
+  double fps = 0.0;                     // frames a second; 0: 30 in the room, 10 in the street
+  double speed_scale = 1.0;             // the same way in fewer (> 1) or more (< 1) frames
+  TurnAxis turn_axis = TurnAxis::kYaw;  // gimbal: what the camera turns about in place
+  double turn_deg = 120.0;              // gimbal: angle turned in place; negative turns left
   double lever_arm_m = 0.0;  // gimbal: from the axis of the turn forward to the camera's centre
   std::string poses;         // street: KITTI pose file; empty: the built-in path
   int distractors = 0;       // boxes moving through the scene

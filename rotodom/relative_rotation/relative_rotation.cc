@@ -14,7 +14,10 @@
 namespace rotslam {
 namespace {
 
-// Torr's geometric information criterion for four-dimensional data (two image points a match).
+// Which rotation to believe is another question than whether there is a baseline: where both models
+// fit, as on the narrow strip that views after a long turn share, a small baseline would go into
+// the rotation. Torr's geometric information criterion for four-dimensional data (two image points
+// a match).
 // @param squared_distances, squared_flows  of all pairs under either model, rad^2.
 bool RotationExplains(const std::vector<double>& squared_distances,
                       const std::vector<double>& squared_flows,
@@ -32,6 +35,31 @@ bool RotationExplains(const std::vector<double>& squared_distances,
     rotation += std::min(0.5 * squared * per_variance, 4.0);
   }
   return rotation < epipolar;
+}
+
+// Whether the members' matches show a baseline.
+BaselineEvidence EvidenceOf(const PairArrays& members,
+                            const std::vector<int>& member_indices,
+                            std::span<const KeypointCovariances> covariances,
+                            const BaselineHypotheses& hypotheses,
+                            double focal_px,
+                            const RelativeRotationOptions& options) {
+  std::vector<KeypointCovariances> of_members;
+  if (!covariances.empty()) {
+    of_members.reserve(member_indices.size());
+    for (const int index : member_indices) of_members.push_back(covariances[index]);
+  }
+  return TestBaseline(
+      members, of_members, hypotheses, options.shared_error_px, focal_px, options.baseline);
+}
+
+// Of the matches that agree with the epipolar model, a rotation that is to replace it explains this
+// share. A test between two models does not see that both are wrong.
+constexpr double kSmallestTurnedShare = 0.7;
+
+int NumBelow(const std::vector<double>& squares, double limit) {
+  return static_cast<int>(std::count_if(
+      squares.begin(), squares.end(), [&](double square) { return square <= limit; }));
 }
 
 // Sign of the direction that puts most points in front of both cameras.
@@ -96,7 +124,7 @@ std::optional<std::string> RelativeRotationOptions::Problem() const {
     return OutOfRange("refine_iterations", refine_iterations, "at least 1");
   }
   if (min_inliers < 6) return OutOfRange("min_inliers", min_inliers, "at least 6");
-  return std::nullopt;
+  return ProblemIn("baseline", baseline);
 }
 
 std::optional<RelativeRotationEstimate> EstimateRelativeRotation(
@@ -104,10 +132,14 @@ std::optional<RelativeRotationEstimate> EstimateRelativeRotation(
     const Rotation& predicted_j_from_i,
     double focal_px,
     const RelativeRotationOptions& options,
-    std::uint64_t seed) {
+    std::uint64_t seed,
+    std::span<const KeypointCovariances> covariances) {
   if (const auto problem = options.Problem())
     throw std::invalid_argument("RelativeRotationOptions: " + *problem);
   CheckPairs(pairs);
+  if (!covariances.empty() && covariances.size() != pairs.size()) {
+    throw std::invalid_argument("EstimateRelativeRotation: not one covariance per pair");
+  }
   if (static_cast<int>(pairs.size()) < options.min_inliers) return std::nullopt;
 
   const double threshold = options.inlier_px / focal_px;
@@ -140,12 +172,23 @@ std::optional<RelativeRotationEstimate> EstimateRelativeRotation(
 
   const RotationFit rotation =
       RefineRotation(arrays, epipolar.model.j_from_i, 2.0 * loss, options.refine_iterations);
-  estimate.rotation_only = RotationExplains(squared_distances,
-                                            SquaredFlows(arrays, rotation.j_from_i),
-                                            std::hypot(noise, options.shared_error_px / focal_px));
+  estimate.baseline = EvidenceOf(arrays,
+                                 consensus.members,
+                                 covariances,
+                                 {rotation.j_from_i, epipolar.model},
+                                 focal_px,
+                                 options);
+  const int num_turned =
+      NumBelow(SquaredFlows(arrays, rotation.j_from_i), 2.0 * threshold * threshold);
+  estimate.rotation_only =
+      !estimate.baseline.ShowsBaseline() && num_turned >= kSmallestTurnedShare * num_inliers;
   // The rotation's own block bounds what either model can know of it.
   if (!IsFixed(rotation.H)) return std::nullopt;
-  if (estimate.rotation_only) {
+  const bool believes_rotation =
+      RotationExplains(squared_distances,
+                       SquaredFlows(arrays, rotation.j_from_i),
+                       std::hypot(noise, options.shared_error_px / focal_px));
+  if (believes_rotation) {
     estimate.j_from_i = rotation.j_from_i;
     // A baseline that shows no more flow than the shared error goes into the rotation; on rendered
     // gimbals, half of it did.
@@ -158,10 +201,13 @@ std::optional<RelativeRotationEstimate> EstimateRelativeRotation(
     return estimate;
   }
   estimate.j_from_i = epipolar.model.j_from_i;
-  estimate.translation_direction = WithForwardSign(all, estimate.inliers, epipolar.model);
   const Eigen::Matrix<double, 5, 5> covariance = noise * noise * epipolar.normal.H.inverse();
   if (!covariance.allFinite()) return std::nullopt;
   estimate.covariance = covariance.topLeftCorner<3, 3>();
+  estimate.translation_direction.setZero();
+  estimate.translation_covariance.setZero();
+  if (estimate.rotation_only) return estimate;
+  estimate.translation_direction = WithForwardSign(all, estimate.inliers, epipolar.model);
   const Eigen::Matrix<double, 3, 2> basis = TangentBasis(epipolar.model.direction);
   estimate.translation_covariance =
       basis * covariance.bottomRightCorner<2, 2>() * basis.transpose();

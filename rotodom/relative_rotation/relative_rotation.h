@@ -2,9 +2,11 @@
 
 #include <cstdint>
 #include <optional>
+#include <span>
 #include <string>
 #include <vector>
 
+#include "rotodom/relative_rotation/baseline_test.h"
 #include "rotodom/relative_rotation/bearing_pair.h"
 #include "rotodom/types/rotation.h"
 
@@ -43,6 +45,8 @@ struct RelativeRotationOptions {
   // Fewer inliers than this are no measurement. The paper's theta_matches is 100; see
   // `ViewGraphOptions` for the threshold on edges.
   int min_inliers = 15;
+  // Whether the views are from one place.
+  BaselineTestOptions baseline;
 
   std::optional<std::string> Problem() const;
 
@@ -59,6 +63,7 @@ struct RelativeRotationOptions {
     visit("max_samples", max_samples);
     visit("refine_iterations", refine_iterations);
     visit("min_inliers", min_inliers);
+    visit("baseline", baseline);
   }
 };
 
@@ -66,12 +71,13 @@ struct RelativeRotationOptions {
 struct RelativeRotationEstimate {
   Rotation j_from_i;
   Eigen::Matrix3d covariance;  // of delta in Exp(delta) * j_from_i, rad^2
-  // x_j = R x_i + s t, s > 0; unit, or zero when rotation_only.
+  // x_j = R x_i + s t, s > 0; unit, or zero when rotation_only or j_from_i is that of no baseline.
   Eigen::Vector3d translation_direction;
   // Of the direction's small changes, rad^2: rank two, zero along the direction; zero when
   // rotation_only.
   Eigen::Matrix3d translation_covariance;
   bool rotation_only = false;  // rotation alone explains the matches: no evidence of a baseline
+  BaselineEvidence baseline;   // what that was decided by
   double noise_px = 0.0;       // robust standard deviation of the inliers' Sampson distance
   double parallax_px = 0.0;  // root mean square of the inliers' flow that rotation does not explain
   std::vector<int> inliers;  // positions in `pairs`, ascending
@@ -85,14 +91,17 @@ struct RelativeRotationEstimate {
 /// the truncated Sampson distance, which stays valid as the baseline vanishes (consensus.h). The
 /// best is refined on all matches but those that only chance makes agree: once as (rotation,
 /// translation direction) on the Sampson distance and once as rotation alone, both with a
-/// redescending loss; the model is chosen by the geometric information criterion with the noise the
-/// first one measures. Matches that carry a MatchNoise are weighted by it throughout.
+/// redescending loss. TestBaseline decides whether there is a baseline, Torr's geometric
+/// information criterion which of the two rotations is the better one; they ask different questions
+/// and differ where the baseline is at the limit. Matches that carry a MatchNoise are weighted by
+/// it throughout.
 /// @param pairs                matched bearings, wrong ones among them; a bearing that is not
 /// finite
 ///                             or a covariance that is none throws std::invalid_argument.
 /// @param predicted_j_from_i   where to start; may be far off.
 /// @param focal_px             pixels per radian, for the thresholds.
 /// @param seed                 same seed, same answer.
+/// @param covariances          one per pair, or none; for the test of the baseline only.
 /// @return  nullopt when fewer than options.min_inliers matches agree, or do not fix the rotation.
 /// Error:   medians of 80 scenes, 1,000 matches, 0.5 px at f = 700, 0 / 25 / 50 % wrong: 0.005 /
 ///          0.006 / 0.006 deg without baseline, 0.020 / 0.030 / 0.035 at 1 % of the depth, 0.018 /
@@ -101,13 +110,13 @@ struct RelativeRotationEstimate {
 ///          and not into its covariance.
 /// Cost:    0.3 ms for 1,000 matches with AVX2, 1.2 ms when samples must be drawn to the end.
 /// Source:  Torr, Geometric motion segmentation and model selection, 1998 (criterion); Muhle et
-/// al.,
-///          The Probabilistic Normal Epipolar Constraint, CVPR 2022 (weights).
+/// al., The Probabilistic Normal Epipolar Constraint, CVPR 2022 (weights).
 std::optional<RelativeRotationEstimate> EstimateRelativeRotation(
     const std::vector<BearingPair>& pairs,
     const Rotation& predicted_j_from_i,
     double focal_px,
     const RelativeRotationOptions& options,
-    std::uint64_t seed);
+    std::uint64_t seed,
+    std::span<const KeypointCovariances> covariances = {});
 
 }  // namespace rotslam

@@ -23,6 +23,8 @@ struct RelativeRotation {
   Eigen::Vector3d translation_direction = Eigen::Vector3d::Zero();
   int num_inliers = 0;
   bool rotation_only = false;  // the matches give no evidence of a baseline
+  // That evidence as a share of what would be enough: one is at the false-alarm rate asked for.
+  double baseline_strength = 0.0;
   double noise_px = 0.1;  // standard deviation of the inliers' distance from their epipolar lines
   double parallax_px = 0.0;  // root mean square of the inliers' flow that rotation does not explain
 };

@@ -8,6 +8,23 @@
 namespace rotslam {
 namespace {
 
+// Both zero where the keypoint is a new corner's; none where a view does not know its own.
+std::vector<KeypointCovariances> CovariancesOf(const Features& view_i,
+                                               const Features& view_j,
+                                               const std::vector<std::array<int, 2>>& keypoints) {
+  const auto knows = [](const Features& view) {
+    return std::ssize(view.covariances_px) == view.size();
+  };
+  std::vector<KeypointCovariances> covariances;
+  if (!knows(view_i) || !knows(view_j)) return covariances;
+  covariances.reserve(keypoints.size());
+  for (const auto& [of_i, of_j] : keypoints) {
+    covariances.push_back(
+        {view_i.covariances_px[of_i].cast<double>(), view_j.covariances_px[of_j].cast<double>()});
+  }
+  return covariances;
+}
+
 std::vector<std::array<int, 2>> FindCommonPoints(const Features& view_i, const Features& view_j) {
   std::vector<std::array<int, 2>> keypoints;
   int i = 0;
@@ -39,8 +56,12 @@ std::optional<Connection> ConnectByMatches(const Features& view_i,
   const FrameId j = view_j.frame;
   const std::uint64_t seed = options.seed * 0x9E3779B97F4A7C15ULL +
                              (std::uint64_t(i.value) << 32 | std::uint32_t(j.value));
-  const auto estimate = EstimateRelativeRotation(
-      pairs, predicted_j_from_i, focal_px, options.relative_rotation, seed);
+  const auto estimate = EstimateRelativeRotation(pairs,
+                                                 predicted_j_from_i,
+                                                 focal_px,
+                                                 options.relative_rotation,
+                                                 seed,
+                                                 CovariancesOf(view_i, view_j, keypoints));
   if (!estimate) return std::nullopt;
 
   Connection connection;
@@ -51,6 +72,7 @@ std::optional<Connection> ConnectByMatches(const Features& view_i,
   connection.edge.translation_direction = estimate->translation_direction;
   connection.edge.num_inliers = static_cast<int>(estimate->inliers.size());
   connection.edge.rotation_only = estimate->rotation_only;
+  connection.edge.baseline_strength = estimate->baseline.strength;
   connection.edge.noise_px = estimate->noise_px;
   connection.edge.parallax_px = estimate->parallax_px;
   std::size_t next_inlier = 0;

@@ -36,6 +36,15 @@ class SharedData : public testing::Test {
 
   fs::path Out() const { return folder_.path() / "out"; }
 
+  // Frames that segments.csv says rotate in place or stand still.
+  int NumHeldFrames() const {
+    int count = 0;
+    for (const SegmentRow& segment : ReadSegments(Out() / "segments.csv")) {
+      if (segment.kind != "translating") count += segment.last - segment.first + 1;
+    }
+    return count;
+  }
+
   std::size_t NumPoses(const std::string& file) const {
     return ReadTrajectory(Out() / file).size();
   }
@@ -62,6 +71,7 @@ TEST_F(SharedData, Kitti00) {
   EXPECT_LE(metrics.rpe1_deg, 0.080);  // ORB-SLAM2's; the truth's own error is 0.061
   EXPECT_LT(metrics.ate_m.value_or(1e9), 1.2);
   EXPECT_GT(CountPlyPoints(Out() / "cloud.ply"), 5000);
+  EXPECT_LE(NumHeldFrames(), 2);  // of 200; straight road and a turn of 90 deg
 }
 
 TEST_F(SharedData, SevenScenesKitchen) {
@@ -73,6 +83,20 @@ TEST_F(SharedData, SevenScenesKitchen) {
   EXPECT_LE(metrics.rpe1_deg, 0.247);  // ORB-SLAM2's
   EXPECT_LT(metrics.ate_m.value_or(1e9), 0.05);
   EXPECT_GT(CountPlyPoints(Out() / "cloud.ply"), 5000);
+  EXPECT_LE(NumHeldFrames(), 20);  // of 400
+}
+
+TEST_F(SharedData, Pan720NeverLeavesItsPlace) {
+  ROTSLAM_SKIP_WITHOUT("pan720");
+  ASSERT_NO_FATAL_FAILURE(Do("run", "pan720", {"--camera", Camera("pan720.yaml")}));
+  const std::vector<SegmentRow> segments = ReadSegments(Out() / "segments.csv");
+  ASSERT_EQ(segments.size(), 1u);
+  EXPECT_EQ(segments[0].kind, "rotating");
+  EXPECT_EQ(segments[0].last, 360);
+  EXPECT_EQ(CountPlyPoints(Out() / "cloud.ply"), 0);
+  for (const StampedPose& pose : ReadTrajectory(Out() / "trajectory_tum.txt")) {
+    EXPECT_EQ(pose.center_in_world, Eigen::Vector3d::Zero());
+  }
 }
 
 TEST_F(SharedData, Pan720) {

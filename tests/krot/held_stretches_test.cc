@@ -1,5 +1,6 @@
 #include "krot/held_stretches.h"
 
+#include <algorithm>
 #include <stdexcept>
 
 #include <gtest/gtest.h>
@@ -169,6 +170,68 @@ TEST(FindHeldStretches, LongEdgesCountWhereThereAreNoOthers) {
   EXPECT_GE(stretches[0].last, FrameId{37});
 }
 
+// Something moves through the picture, or one frame is blurred.
+TEST(FindHeldStretches, DirectEdgesBridgeABadFrame) {
+  Path path = MakePath(std::vector<double>(30, 0.0));
+  const auto disturb = [&](int frame) {
+    for (int before = frame - 4; before <= frame + 4; ++before) {
+      if (before == frame) continue;
+      RelativeRotation edge = *path.graph.FindEdge(FrameId{before}, FrameId{frame});
+      edge.rotation_only = false;
+      path.graph.AddEdge(edge);
+    }
+  };
+  for (const int frame : {14, 15, 16}) disturb(frame);
+  EXPECT_EQ(Find(path).size(), 2u);
+  for (int k = 20; k < 30; ++k) {
+    RelativeRotation edge{FrameId{5}, FrameId{k}, Rotation::Exp({0.0, 0.02 * (k - 5), 0.0})};
+    edge.rotation_only = true;
+    path.graph.AddEdge(edge);
+  }
+  const auto stretches = Find(path);
+  ASSERT_EQ(stretches.size(), 1u);
+  EXPECT_EQ(stretches[0].first, FrameId{0});
+  EXPECT_EQ(stretches[0].last, FrameId{29});
+  HeldStretchOptions options;
+  options.max_gap = 0;
+  EXPECT_EQ(Find(path, options).size(), 2u);
+}
+
+// Neighbours stand too near for a baseline to show, and so do the ends of short edges; an edge to a
+// frame long ago does not.
+TEST(FindHeldStretches, LongEdgesInsideTellACreepingCamera) {
+  Path path = MakePath(WalkStopWalk(40, 0, 0, 0.05));
+  EXPECT_EQ(Find(path).size(), 1u);
+  for (int k = 12; k <= 40; ++k) {
+    path.graph.AddEdge({FrameId{k - 12}, FrameId{k}, Rotation::Exp({0.0, 0.24, 0.0})});
+  }
+  EXPECT_TRUE(Find(path).empty());
+}
+
+TEST(FindHeldStretches, TellsStandingStillFromTurning) {
+  Path path = MakePath(std::vector<double>(40, 0.0));
+  const double sigma = 1e-5;
+  ViewGraph graph;
+  for (RelativeRotation edge : path.graph.edges()) {
+    edge.covariance = sigma * sigma * Eigen::Matrix3d::Identity();
+    // At rest for the first half, but for the noise.
+    const double turn = 0.02 * std::max(0, edge.j.value - std::max(20, edge.i.value));
+    edge.j_from_i = Rotation::Exp({sigma, turn - sigma, sigma});
+    graph.AddEdge(edge);
+  }
+  path.graph = graph;
+  const auto stretches = Find(path);
+  ASSERT_EQ(stretches.size(), 1u);
+  EXPECT_EQ(stretches[0].last, FrameId{39});
+  ASSERT_EQ(stretches[0].still.size(), 1u);
+  EXPECT_EQ(stretches[0].still[0].first, FrameId{0});
+  EXPECT_GE(stretches[0].still[0].last, FrameId{19});
+  EXPECT_LE(stretches[0].still[0].last, FrameId{22});
+  HeldStretchOptions sharp;
+  sharp.still_sigmas = 0.1;
+  EXPECT_TRUE(Find(path, sharp)[0].still.empty());
+}
+
 TEST(FindHeldStretches, FrameNumbersMayHaveGaps) {
   const auto dense = Find(MakePath(WalkStopWalk(10, 15, 10)));
   const auto sparse = Find(MakePath(WalkStopWalk(10, 15, 10), 4, 0.5, 100, 5));
@@ -196,6 +259,8 @@ TEST(FindHeldStretches, RejectsAnEdgeToAFrameWithoutOrientation) {
 TEST(HeldStretchOptions, NamesTheFirstFieldOutOfRange) {
   EXPECT_FALSE(HeldStretchOptions{}.Problem());
   HeldStretchOptions options;
+  options.still_sigmas = 0.0;
+  EXPECT_EQ(options.Problem(), "still_sigmas is 0, must be positive");
   options.min_frames = 1;
   EXPECT_EQ(options.Problem(), "min_frames is 1, must be at least 2");
   options.max_edge_span = 0;

@@ -1,0 +1,161 @@
+#include "rotodom/relative_rotation/baseline_test.h"
+
+#include <algorithm>
+#include <cmath>
+#include <stdexcept>
+#include <vector>
+
+#include <Eigen/Dense>
+
+#include "rotodom/types/options.h"
+
+namespace rotslam {
+namespace {
+
+// Keypoints are no better than this, whatever their covariances say.
+constexpr double kSmallestSigmaPx = 0.02;
+
+// Squared errors of a match in units of its covariance.
+struct WhitenedErrors {
+  double rotation = 0.0;  // two dimensions
+  double epipolar = 0.0;  // across the line
+  double shared = 0.0;    // of an error as large as the shared one, along the line
+};
+
+// Covariance of the difference of bearings in view j, along the columns of `basis_j`, in units of a
+// squared pixel.
+Eigen::Matrix2d CovarianceOfDifference(const Eigen::Vector3d& bearing_i,
+                                       const Eigen::Vector3d& bearing_j,
+                                       const Eigen::Matrix<double, 3, 2>& basis_j,
+                                       const Eigen::Matrix3d& R_j_i,
+                                       const KeypointCovariances& covariances) {
+  const Eigen::Matrix2d carried = basis_j.transpose() * R_j_i * TangentBasis(bearing_i);
+  const Eigen::Matrix2d floor = kSmallestSigmaPx * kSmallestSigmaPx * Eigen::Matrix2d::Identity();
+  return carried * TangentCovariance(bearing_i, covariances.i_px) * carried.transpose() +
+         TangentCovariance(bearing_j, covariances.j_px) + floor;
+}
+
+class Whitening {
+ public:
+  Whitening(const BaselineHypotheses& hypotheses, double shared_error_rad, double focal_px)
+      : rotation_(hypotheses.rotation.Matrix()),
+        epipolar_(hypotheses.epipolar.j_from_i.Matrix()),
+        direction_(hypotheses.epipolar.direction),
+        squared_shared_(shared_error_rad * shared_error_rad),
+        squared_pixel_(1.0 / (focal_px * focal_px)) {}
+
+  WhitenedErrors operator()(const Eigen::Vector3d& bearing_i,
+                            const Eigen::Vector3d& bearing_j,
+                            const KeypointCovariances* covariances) const {
+    const Eigen::Matrix<double, 3, 2> basis = TangentBasis(bearing_j);
+    const Eigen::Matrix2d C =
+        squared_pixel_ *
+        (covariances == nullptr
+             ? Eigen::Matrix2d(2.0 * Eigen::Matrix2d::Identity())
+             : CovarianceOfDifference(bearing_i, bearing_j, basis, rotation_, *covariances));
+    const Eigen::Vector2d across = (basis.transpose() * direction_.cross(bearing_j)).normalized();
+    const Eigen::Vector2d along(-across.y(), across.x());
+    const Eigen::Vector2d of_rotation = basis.transpose() * (rotation_ * bearing_i - bearing_j);
+    const Eigen::Vector2d of_epipolar = basis.transpose() * (epipolar_ * bearing_i - bearing_j);
+    const double distance = across.dot(of_epipolar);
+    const Eigen::Matrix2d information = C.inverse();
+    return {of_rotation.dot(information * of_rotation),
+            distance * distance / across.dot(C * across),
+            squared_shared_ * along.dot(information * along)};
+  }
+
+ private:
+  Eigen::Matrix3d rotation_;
+  Eigen::Matrix3d epipolar_;
+  Eigen::Vector3d direction_;
+  double squared_shared_;
+  double squared_pixel_;
+};
+
+// Robust variance of the errors across the lines: they have one dimension.
+double VarianceAcross(const std::vector<WhitenedErrors>& errors) {
+  constexpr double kFromMedian = 1.4826 * 1.4826;
+  std::vector<double> squares;
+  squares.reserve(errors.size());
+  for (const WhitenedErrors& error : errors) squares.push_back(error.epipolar);
+  const auto middle = squares.begin() + static_cast<std::ptrdiff_t>(squares.size() / 2);
+  std::nth_element(squares.begin(), middle, squares.end());
+  return kFromMedian * *middle;
+}
+
+// The most that the errors of one view pair show in any direction, in standard deviations: with
+// that probability a chi-square variable of four degrees of freedom stays below its square. The
+// directions are a family of two parameters; for translations in the image plane alone two degrees
+// would be exact.
+double CriticalSigmas(double false_alarm_rate) {
+  double low = 0.0;
+  double high = 1e3;
+  while (high - low > 1e-9 * high) {
+    const double half = 0.5 * (low + high);  // of the square
+    ((1.0 + half) * std::exp(-half) > false_alarm_rate ? low : high) = half;
+  }
+  return std::sqrt(2.0 * high);
+}
+
+}  // namespace
+
+std::optional<std::string> BaselineTestOptions::Problem() const {
+  if (!(false_alarm_rate > 0.0 && false_alarm_rate < 1.0)) {
+    return OutOfRange("false_alarm_rate", false_alarm_rate, "between 0 and 1");
+  }
+  if (!(anisotropy >= 0.0)) return OutOfRange("anisotropy", anisotropy, "zero or more");
+  if (!(lens_error >= 0.0)) return OutOfRange("lens_error", lens_error, "zero or more");
+  if (!(clip_sigmas > 0.0)) return OutOfRange("clip_sigmas", clip_sigmas, "positive");
+  return std::nullopt;
+}
+
+BaselineEvidence TestBaseline(const PairArrays& pairs,
+                              std::span<const KeypointCovariances> covariances,
+                              const BaselineHypotheses& hypotheses,
+                              double shared_error_px,
+                              double focal_px,
+                              const BaselineTestOptions& options) {
+  if (!covariances.empty() && std::ssize(covariances) != pairs.size()) {
+    throw std::invalid_argument("TestBaseline: not one covariance per pair");
+  }
+  if (pairs.size() == 0) return {};
+  const double lens_error = options.lens_error * hypotheses.rotation.Angle();
+  const Whitening whiten(hypotheses, std::hypot(shared_error_px / focal_px, lens_error), focal_px);
+  std::vector<WhitenedErrors> errors;
+  errors.reserve(pairs.size());
+  for (int k = 0; k < pairs.size(); ++k) {
+    errors.push_back(whiten(
+        pairs.BearingI(k), pairs.BearingJ(k), covariances.empty() ? nullptr : &covariances[k]));
+  }
+
+  const double variance = VarianceAcross(errors);
+  const double limit = options.clip_sigmas * options.clip_sigmas * variance;
+  double across = 0.0;
+  double sum = 0.0;
+  double squares = 0.0;
+  double shared = 0.0;
+  for (const WhitenedErrors& error : errors) {
+    const double of_line = std::min(error.epipolar, limit);
+    const double beyond = std::clamp(error.rotation - error.epipolar, -limit, limit) - of_line;
+    across += of_line;
+    sum += beyond;
+    squares += beyond * beyond;
+    shared += std::min(error.shared, limit);
+  }
+  const double n = static_cast<double>(pairs.size());
+  // Exact matches have no noise to measure anything by.
+  if (!(across > 0.0)) return {};
+  const double mean = sum / n;
+  // What the epipolar fit takes out of its errors by its unknowns, and the rotation's does not.
+  constexpr double kFitted = 7.0;
+  const double allowed = ((options.anisotropy + kFitted / n) * across + shared) / n;
+  const double spread = std::max(squares / n - mean * mean, 1e-12 * variance * variance);
+  const double sigma = std::sqrt(spread / n);
+  BaselineEvidence evidence;
+  evidence.excess = sum / across;
+  evidence.sigmas = (mean - allowed) / sigma;
+  evidence.strength = evidence.sigmas / CriticalSigmas(options.false_alarm_rate);
+  return evidence;
+}
+
+}  // namespace rotslam
