@@ -16,7 +16,7 @@ struct BaselineTestOptions {
   double false_alarm_rate = 1e-3;
   // Errors along one direction of the image may have a variance this much larger than across it, as
   // a share, beyond what the matches' covariances say: streets and rooms are full of parallel
-  // edges. On rotations of rendered rooms and panoramas the share is 0.2 and 0 in the median and
+  // edges. On rotations of rendered rooms and panoramas the share is 0.3 and 0 in the median and
   // 0.7 in one of a hundred pairs.
   double anisotropy = 0.5;
   // Part of the turn between the views that the lens' calibration may have wrong, as an error along
