@@ -91,6 +91,19 @@ std::vector<Segment> Segments(const PositionResult& positions) {
   return segments;
 }
 
+// What a reader of a trajectory must know: where nothing measured its scale.
+std::vector<std::string> CommentsOn(const std::vector<Segment>& segments) {
+  std::vector<std::string> comments;
+  for (const Segment& segment : segments) {
+    if (segment.scale != "continuity") continue;
+    comments.push_back("frames " + std::to_string(segment.first_frame) + " to " +
+                       std::to_string(segment.last_frame) + ": " + segment.kind + " on part " +
+                       std::to_string(segment.component) +
+                       " of the map, whose scale nothing measures; the speed before it goes on");
+  }
+  return comments;
+}
+
 // Looks every sighting up among its frame's features, whose keypoint it is to the last bit.
 void FindLevels(const std::map<FrameId, Features>& features, RunMap& map) {
   for (const auto& [frame, keypoints] : ListKeypoints(map)) {
@@ -143,14 +156,17 @@ void WritePositions(const std::filesystem::path& directory,
                     PlyForm form) {
   const Trajectory trajectory = MakeTrajectory(
       orientations.timestamps_s, positions.cam_from_world, positions.center_in_world);
-  WriteTumTrajectory(directory / "trajectory_tum.txt", trajectory);
+  const std::vector<Segment> segments = Segments(positions);
+  const std::vector<std::string> comments = CommentsOn(segments);
+  WriteTumTrajectory(directory / "trajectory_tum.txt", trajectory, comments);
   WriteKittiTrajectory(directory / "trajectory_kitti.txt", trajectory);
   CenterMap keyframe_centers = positions.center_in_world;
   std::erase_if(keyframe_centers,
                 [&](const auto& entry) { return !positions.keyframes.contains(entry.first); });
   WriteTumTrajectory(
       directory / "keyframes_tum.txt",
-      MakeTrajectory(orientations.timestamps_s, positions.cam_from_world, keyframe_centers));
+      MakeTrajectory(orientations.timestamps_s, positions.cam_from_world, keyframe_centers),
+      comments);
   WritePly(directory / "cloud.ply", MakeCloud(positions.cloud, camera), form);
   std::vector<Frustum> frusta;
   frusta.reserve(keyframe_centers.size());
@@ -159,7 +175,7 @@ void WritePositions(const std::filesystem::path& directory,
     frusta.push_back({positions.cam_from_world.at(frame), center, size});
   }
   WriteFrustaPly(directory / "cameras.ply", frusta, camera, form);
-  WriteSegments(directory / "segments.csv", Segments(positions));
+  WriteSegments(directory / "segments.csv", segments);
 }
 
 void WriteKnownRotationInput(const std::filesystem::path& directory,

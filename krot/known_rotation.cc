@@ -219,37 +219,40 @@ void TakeCenters(const std::vector<FrameId>& views,
 }
 
 // Enters what a component's observations say about the least possible largest residual; the best
-// structure's centres become the component's where they are asked for. Returns whether the bracket
-// is as narrow as asked.
-bool BoundResidual(const RotationMap& cam_from_world,
-                   const std::vector<Track>& tracks,
-                   const TrackPoints& points,
-                   const KrotOptions& options,
-                   const KrotUnits& units,
-                   CenterMap& centers,
-                   KrotSolution& solution) {
+// structure's centres become the component's where they are asked for. Returns how the search
+// ended.
+BisectionStatus BoundResidual(const RotationMap& cam_from_world,
+                              const std::vector<Track>& tracks,
+                              const TrackPoints& points,
+                              const KrotOptions& options,
+                              const KrotUnits& units,
+                              CenterMap& centers,
+                              KrotSolution& solution) {
   const KeptProblem kept = TakeKept(cam_from_world, centers, tracks, points, units.min_z);
   const MinimaxProblem& problem = kept.named.problem;
-  double low = 0.0;
-  double high = MaxBoxResidual(problem, kept.structure);
-  bool converged = false;
+  BisectionResult bracket;
+  bracket.status = BisectionStatus::kIterationLimit;
+  bracket.gamma_high = MaxBoxResidual(problem, kept.structure);
   if (options.use_bracket) {
-    const BisectionResult bracket =
-        MinimiseMaxResidual(problem, options.bisection, &kept.structure);
-    solution.num_programs += bracket.num_programs;
-    low = bracket.gamma_low;
-    high = bracket.gamma_high;
-    converged = bracket.status == BisectionStatus::kConverged;
-    if (options.start == "bisection" && high < kInfinity) {
+    bracket = MinimiseMaxResidual(problem, options.bisection, &kept.structure);
+    if (options.start == "bisection" && bracket.gamma_high < kInfinity) {
       TakeCenters(kept.named.views, bracket.structure.center_in_world, centers);
     }
   }
-  solution.gamma_low = std::max(solution.gamma_low, low);
-  solution.gamma_high =
-      solution.gamma_high == kInfinity ? high : std::max(solution.gamma_high, high);
+  if (solution.gamma_high == kInfinity || bracket.gamma_high > solution.gamma_high) {
+    solution.gamma_high = bracket.gamma_high;
+    solution.active.clear();
+    for (const int o : bracket.active) {
+      const ImageObservation& observation = problem.observations[o];
+      solution.active.push_back(
+          {kept.named.tracks[observation.point], kept.named.views[observation.view]});
+    }
+  }
+  solution.gamma_low = std::max(solution.gamma_low, bracket.gamma_low);
+  solution.num_programs += bracket.num_programs;
   solution.num_bracket_observations += static_cast<int>(problem.observations.size());
   solution.num_bracket_tracks += problem.num_points;
-  return converged;
+  return bracket.status;
 }
 
 // Moves a component to its gauge: first centre at the origin, median depth one.
@@ -277,15 +280,15 @@ void Normalise(CenterMap& centers, const std::vector<Track>& tracks, TrackPoints
   }
 }
 
-// Solves one component and enters it into the solution under its number. Returns whether its
-// bracket converged; nullopt when its programs failed.
-std::optional<bool> SolveComponent(const RotationMap& cam_from_world,
-                                   const std::vector<Track>& tracks,
-                                   const std::vector<double>& thresholds,
-                                   const ViewComponent& component,
-                                   const KrotOptions& options,
-                                   const KrotUnits& units,
-                                   KrotSolution& solution) {
+// Solves one component and enters it into the solution under its number. Returns how the search for
+// its bracket ended; nullopt when its programs failed.
+std::optional<BisectionStatus> SolveComponent(const RotationMap& cam_from_world,
+                                              const std::vector<Track>& tracks,
+                                              const std::vector<double>& thresholds,
+                                              const ViewComponent& component,
+                                              const KrotOptions& options,
+                                              const KrotUnits& units,
+                                              KrotSolution& solution) {
   const std::set<FrameId> members(component.views.begin(), component.views.end());
   std::optional<ComponentStart> start =
       StartComponent(cam_from_world, tracks, component, options, units);
@@ -297,7 +300,7 @@ std::optional<bool> SolveComponent(const RotationMap& cam_from_world,
     return TriangulateAll(cam_from_world, centers, tracks, thresholds, options, units);
   };
   TrackPoints points = triangulate();
-  const bool converged =
+  const BisectionStatus bracket =
       BoundResidual(cam_from_world, tracks, points, options, units, centers, solution);
   if (options.start == "bisection") points = triangulate();
   Normalise(centers, tracks, points);
@@ -324,7 +327,7 @@ std::optional<bool> SolveComponent(const RotationMap& cam_from_world,
       solution.removed.push_back({tracks[t].id, observation.frame, RemovalReason::kOtherComponent});
     }
   }
-  return converged;
+  return bracket;
 }
 
 void Describe(int num_views, int num_failed, const KrotUnits& units, KrotSolution& solution) {
@@ -390,18 +393,22 @@ void Solve(const RotationMap& cam_from_world,
   }
   int num_failed = 0;
   bool all_converged = true;
+  bool cancelled = false;
   for (const ViewComponent& component : components) {
-    const auto converged =
+    const auto bracket =
         SolveComponent(cam_from_world, tracks, thresholds, component, options, units, solution);
-    if (!converged) ++num_failed;
-    all_converged = all_converged && converged.value_or(false);
+    if (!bracket) ++num_failed;
+    all_converged = all_converged && bracket == BisectionStatus::kConverged;
+    cancelled = cancelled || bracket == BisectionStatus::kCancelled;
   }
   if (solution.center_in_world.empty()) {
     solution.status = KrotStatus::kSolverFailed;
     solution.message = "the linear programs gave no structure";
     return;
   }
-  solution.status = all_converged ? KrotStatus::kConverged : KrotStatus::kIterationLimit;
+  solution.status = cancelled       ? KrotStatus::kCancelled
+                    : all_converged ? KrotStatus::kConverged
+                                    : KrotStatus::kIterationLimit;
   Describe(static_cast<int>(views.size()), num_failed, units, solution);
 }
 
@@ -434,6 +441,8 @@ std::string ToString(KrotStatus status) {
       return "converged";
     case KrotStatus::kIterationLimit:
       return "iteration_limit";
+    case KrotStatus::kCancelled:
+      return "cancelled";
     case KrotStatus::kInfeasible:
       return "infeasible";
     case KrotStatus::kSolverFailed:

@@ -16,6 +16,7 @@ enum class KrotStatus {
   kNotRun,
   kConverged,       // positions found, brackets as narrow as asked
   kIterationLimit,  // positions found; a bracket stayed wider than asked, or was not asked for
+  kCancelled,       // positions found; bisection.on_progress ended the search for the bracket
   kInfeasible,      // the tracks do not determine positions: none, or no parallax
   kSolverFailed,    // the linear programs gave no structure
 };
@@ -34,6 +35,12 @@ struct RemovedObservation {
   RemovalReason reason;
 };
 
+/// An observation that holds the optimum: its residual is within the asked gap of gamma_high.
+struct ActiveObservation {
+  TrackId track;
+  FrameId frame;
+};
+
 struct KrotSolution {
   KrotStatus status = KrotStatus::kNotRun;
   std::string message;        // one sentence for a person
@@ -50,10 +57,15 @@ struct KrotSolution {
   // kept (to loose_factor thresholds), nearer to the axis than max_off_axis_deg.
   int num_bracket_observations = 0;
   int num_bracket_tracks = 0;
+  std::vector<ActiveObservation> active;    // of the component that has gamma_high
   int num_programs = 0;                     // linear programs solved
   int num_grown_views = 0;                  // views placed by resection
   std::vector<RemovedObservation> removed;  // of tracks that have a point, and unusable ones of any
   double seconds = 0.0;
+
+  /// How far the largest residual can be from the least possible one, as a share of it; one where
+  /// no bracket was asked for.
+  [[nodiscard]] double Gap() const { return gamma_high > 0.0 ? 1.0 - gamma_low / gamma_high : 0.0; }
 
   /// Positions are there and gamma_high is finite, whatever stopped us.
   [[nodiscard]] bool Usable() const { return gamma_high < kInfinity && !center_in_world.empty(); }
@@ -70,7 +82,9 @@ struct KrotSolution {
 /// @return  see KrotSolution. Throws std::invalid_argument when an option is out of range, a track
 ///          names a view without rotation, or the camera has no focal length.
 /// Error:   truth to 1e-6 (relative to the scene) on clean scenes (KnownRotation tests).
-/// Cost:    COST
+/// Cost:    one thread, sequences with tracks of 5 to 7 views: 44 views and 50,000 observations
+///          0.5 s and 0.3 s more for the bracket, 67 and 89,000 0.9 s and 0.6 s, 100 and 149,000
+///          2 s and 0.7 s. Start and bracket grow like the observations to the power 1.2.
 /// Source:  Kahl & Hartley, Multiple-View Geometry under the L-infinity Norm, PAMI 2008, for the
 ///          bracket; Dalalyan & Keriven, L1-penalized robust estimation for a class of inverse
 ///          problems arising in multiview geometry, NIPS 2009, for the L1 start; resection as in

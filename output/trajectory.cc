@@ -100,9 +100,12 @@ Trajectory ReadTrajectory(const std::filesystem::path& path,
   return trajectory;
 }
 
-void WriteTumTrajectory(const std::filesystem::path& path, const Trajectory& trajectory) {
+void WriteTumTrajectory(const std::filesystem::path& path,
+                        const Trajectory& trajectory,
+                        const std::vector<std::string>& comments) {
   RequireFinite(trajectory);
   std::string text;
+  for (const std::string& comment : comments) text += "# " + comment + '\n';
   for (const StampedPose& pose : trajectory) {
     text += FormatNumber("%.9f", pose.timestamp_s);
     for (const double value : pose.center_in_world) Append(text, value);

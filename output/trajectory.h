@@ -2,6 +2,8 @@
 
 #include <filesystem>
 #include <optional>
+#include <string>
+#include <vector>
 
 #include "rotodom/types/trajectory.h"
 
@@ -20,9 +22,12 @@ Trajectory ReadTrajectory(const std::filesystem::path& path,
                           const std::optional<std::filesystem::path>& times = std::nullopt);
 
 /// Writes the TUM format: timestamps with 9 decimals, the rest with 12 significant digits.
+/// @param comments  lines that go before the poses, each behind a '#'.
 /// Throws std::invalid_argument when a pose is not finite, std::runtime_error when the file cannot
 /// be written; never leaves half a file.
-void WriteTumTrajectory(const std::filesystem::path& path, const Trajectory& trajectory);
+void WriteTumTrajectory(const std::filesystem::path& path,
+                        const Trajectory& trajectory,
+                        const std::vector<std::string>& comments = {});
 
 /// Writes the KITTI format, 12 significant digits; timestamps are not in it. Errors as above.
 void WriteKittiTrajectory(const std::filesystem::path& path, const Trajectory& trajectory);

@@ -6,7 +6,7 @@
 #include <string>
 #include <vector>
 
-#include "rotodom/relative_rotation/baseline_test.h"
+#include "rotodom/relative_rotation/baseline_evidence.h"
 #include "rotodom/relative_rotation/bearing_pair.h"
 #include "rotodom/types/rotation.h"
 

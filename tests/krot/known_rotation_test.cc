@@ -129,6 +129,46 @@ TEST(SolveKnownRotation, TenPercentOutliersAreRemovedAndChangeLittle) {
   EXPECT_LT(ErrorOf(solution, scene).max, 1.0);
 }
 
+TEST(SolveKnownRotation, BracketCoversWhatItKeepsAndNamesWhatHoldsIt) {
+  SceneOptions scene_options = Street(20, 1000);
+  scene_options.noise_px = 0.7;
+  const Scene scene = MakeScene(scene_options);
+  const KrotSolution solution = Solve(scene);
+  ASSERT_EQ(solution.status, KrotStatus::kConverged) << solution.message;
+  EXPECT_LE(solution.Gap(), 0.01);
+  int num_observations = 0;
+  for (const Track& track : scene.tracks) {
+    if (!solution.point_in_world.contains(track.id)) continue;
+    num_observations += static_cast<int>(track.observations.size());
+  }
+  EXPECT_EQ(solution.num_bracket_observations,
+            num_observations - static_cast<int>(solution.removed.size()));
+  // A minimum of so many unknowns hangs on several observations at once.
+  EXPECT_GE(solution.active.size(), 4u);
+  for (const ActiveObservation& active : solution.active) {
+    EXPECT_TRUE(solution.point_in_world.contains(active.track));
+    EXPECT_TRUE(solution.center_in_world.contains(active.frame));
+  }
+}
+
+TEST(SolveKnownRotation, CancelledItKeepsPositionsAndAValidBracket) {
+  SceneOptions scene_options = Street(20, 1000);
+  scene_options.noise_px = 0.7;
+  const Scene scene = MakeScene(scene_options);
+  const KrotSolution whole = Solve(scene);
+  KrotOptions options;
+  int calls = 0;
+  options.bisection.on_progress = [&](const BisectionProgress&) { return ++calls < 2; };
+  const KrotSolution cancelled = Solve(scene, options);
+  EXPECT_EQ(cancelled.status, KrotStatus::kCancelled);
+  EXPECT_EQ(calls, 2);
+  EXPECT_TRUE(cancelled.Usable());
+  EXPECT_EQ(cancelled.center_in_world.size(), 20u);
+  EXPECT_GT(cancelled.Gap(), whole.Gap());
+  EXPECT_LE(cancelled.gamma_low, whole.gamma_high);
+  EXPECT_GE(cancelled.gamma_high, whole.gamma_low);
+}
+
 TEST(SolveKnownRotation, GrowsBeyondOneProgram) {
   SceneOptions scene_options = Street(40, 3000);
   scene_options.noise_px = 0.5;

@@ -9,7 +9,7 @@
 
 #include <gtest/gtest.h>
 
-#include "rotodom/relative_rotation/baseline_test.h"
+#include "rotodom/relative_rotation/baseline_evidence.h"
 #include "tests/rotodom/relative_rotation/pair_scene.h"
 
 namespace rotslam {

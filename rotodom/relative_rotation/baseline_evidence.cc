@@ -1,4 +1,4 @@
-#include "rotodom/relative_rotation/baseline_test.h"
+#include "rotodom/relative_rotation/baseline_evidence.h"
 
 #include <algorithm>
 #include <cmath>
