@@ -11,11 +11,9 @@
 #include "krot/component_start.h"
 #include "krot/components.h"
 #include "krot/epipolar_filter.h"
-#include "krot/growth.h"
 #include "krot/minimax_problem.h"
 #include "krot/named_problem.h"
-#include "krot/robust_triangulation.h"
-#include "rotodom/types/parallel.h"
+#include "krot/track_points.h"
 
 namespace rotslam {
 namespace {
@@ -62,51 +60,6 @@ std::vector<double> TrackThresholds(const std::vector<Track>& tracks,
   return thresholds;
 }
 
-void RequireContract(const RotationMap& cam_from_world,
-                     const std::vector<Track>& tracks,
-                     const Camera& camera,
-                     const KrotOptions& options) {
-  if (const auto trouble = options.Problem()) {
-    throw std::invalid_argument("KrotOptions: " + *trouble);
-  }
-  if (!(camera.MeanFocal() > 0.0) || !std::isfinite(camera.MeanFocal())) {
-    throw std::invalid_argument("SolveKnownRotation: the camera has no focal length");
-  }
-  for (const Track& track : tracks) {
-    for (const Observation& observation : track.observations) {
-      if (cam_from_world.contains(observation.frame)) continue;
-      throw std::invalid_argument("SolveKnownRotation: track " + std::to_string(track.id.value) +
-                                  " names view " + std::to_string(observation.frame.value) +
-                                  ", which has no rotation");
-    }
-  }
-}
-
-// Tracks without unusable observations, frames ascending; same order as the input, short ones kept.
-std::vector<Track> CleanTracks(const std::vector<Track>& tracks, KrotSolution& solution) {
-  std::vector<Track> clean;
-  clean.reserve(tracks.size());
-  for (const Track& track : tracks) {
-    Track copy = track;
-    copy.observations.clear();
-    std::set<FrameId> seen;
-    for (const Observation& observation : track.observations) {
-      if (!observation.bearing.allFinite() || std::abs(observation.bearing.norm() - 1.0) > 1e-3) {
-        solution.removed.push_back({track.id, observation.frame, RemovalReason::kNotFinite});
-      } else if (!seen.insert(observation.frame).second) {
-        solution.removed.push_back({track.id, observation.frame, RemovalReason::kDuplicate});
-      } else {
-        copy.observations.push_back(observation);
-      }
-    }
-    std::sort(copy.observations.begin(),
-              copy.observations.end(),
-              [](const Observation& a, const Observation& b) { return a.frame < b.frame; });
-    clean.push_back(std::move(copy));
-  }
-  return clean;
-}
-
 void RemoveEpipolarOutliers(const RotationMap& cam_from_world,
                             const KrotOptions& options,
                             const KrotUnits& units,
@@ -124,41 +77,6 @@ void RemoveEpipolarOutliers(const RotationMap& cam_from_world,
         {tracks[index.track].id, observations[index.observation].frame, RemovalReason::kEpipolar});
     observations.erase(observations.begin() + index.observation);
   }
-}
-
-// Points of all tracks from a component's centres, by track position; what disagrees is reported.
-struct TrackPoint {
-  Eigen::Vector3d point_in_world;
-  std::vector<FrameId> outliers;
-};
-using TrackPoints = std::vector<std::optional<TrackPoint>>;
-
-TrackPoints TriangulateAll(const RotationMap& cam_from_world,
-                           const CenterMap& centers,
-                           const std::vector<Track>& tracks,
-                           const std::vector<double>& thresholds,
-                           const KrotOptions& options,
-                           const KrotUnits& units) {
-  TrackPoints points(tracks.size());
-  ParallelFor(static_cast<int>(tracks.size()), options.num_threads, [&](int t) {
-    std::vector<int> observations;
-    const std::vector<Sighting> sightings =
-        PlacedSightings(cam_from_world, centers, tracks[t], units.focal_px, &observations);
-    const auto robust =
-        TriangulateRobustly(sightings, units.point_angle_rad, options.loose_factor * thresholds[t]);
-    if (!robust) return;
-    TrackPoint point{robust->point_in_world, {}};
-    std::size_t next = 0;
-    for (int k = 0; k < static_cast<int>(sightings.size()); ++k) {
-      if (next < robust->inliers.size() && robust->inliers[next] == k) {
-        ++next;
-      } else {
-        point.outliers.push_back(tracks[t].observations[observations[k]].frame);
-      }
-    }
-    points[t] = std::move(point);
-  });
-  return points;
 }
 
 // What the triangulation kept, as the minimax problem and its structure.
@@ -357,7 +275,7 @@ void Solve(const RotationMap& cam_from_world,
            const KrotOptions& options,
            KrotUnits units,
            KrotSolution& solution) {
-  std::vector<Track> tracks = CleanTracks(input, solution);
+  std::vector<Track> tracks = CleanTracks(input, solution.removed);
   const std::vector<double> thresholds = TrackThresholds(tracks, sigma_rad, options, units);
   units = WithThreshold(units, MedianOf(thresholds, units.gamma), options);
   std::set<FrameId> views;

@@ -307,7 +307,8 @@ MinimaxLpResult SolveL1SlackInterior(const MinimaxProblem& problem,
                                      double gamma,
                                      double depth_price,
                                      const std::vector<double>& weights,
-                                     const L1InteriorOptions& options) {
+                                     const L1InteriorOptions& options,
+                                     const MinimaxStructure* start) {
   RequireProgram(problem, gamma);
   if (!weights.empty() && weights.size() != problem.observations.size()) {
     throw std::invalid_argument("L1 slack program: one weight per observation expected");
@@ -316,7 +317,9 @@ MinimaxLpResult SolveL1SlackInterior(const MinimaxProblem& problem,
   {
     const Stopwatch stopwatch(result.seconds);
     const Program program(problem, gamma, depth_price, weights);
-    Iterate at = Start(program, PointsAround(problem, program.layout()));
+    Iterate at = Start(program,
+                       start == nullptr ? PointsAround(problem, program.layout())
+                                        : Packed(program.layout(), *start));
     result.call = Converge(problem, program, depth_price, options, at, result.iterations);
     result.structure = Unpacked(program.layout(), at.x);
     result.objective = Objective(program, at);

@@ -17,6 +17,9 @@ struct L1InteriorOptions {
 /// SolveL1Slack by an interior-point method of our own, which eliminates the slacks and points and
 /// factors the centres' system: some hundred times less work than a general engine.
 /// @param weights  price of each observation's slack, positive; empty: all one.
+/// @param start    first iterate, and where the problem's fixed views and points are: needed when
+/// it
+///                 has any. The smallest depth asked for is one in its scale, too.
 /// @return  kCompleted when the tolerance was reached. Multipliers are those of the last iterate.
 ///          Throws std::invalid_argument as SolveL1Slack does.
 /// Cost:    20 to 40 iterations of a StructureSystem.
@@ -26,6 +29,7 @@ MinimaxLpResult SolveL1SlackInterior(const MinimaxProblem& problem,
                                      double gamma,
                                      double depth_price,
                                      const std::vector<double>& weights = {},
-                                     const L1InteriorOptions& options = {});
+                                     const L1InteriorOptions& options = {},
+                                     const MinimaxStructure* start = nullptr);
 
 }  // namespace rotslam

@@ -32,6 +32,13 @@ void CheckProblem(const MinimaxProblem& problem) {
   for (const Eigen::Matrix3d& R_c_w : problem.R_c_w) {
     if (!R_c_w.allFinite()) throw std::invalid_argument("minimax problem: rotation not finite");
   }
+  const auto fits = [](const std::vector<bool>& flags, int count) {
+    return flags.empty() || std::ssize(flags) == count;
+  };
+  if (!fits(problem.view_fixed, problem.num_views()) ||
+      !fits(problem.point_fixed, problem.num_points)) {
+    throw std::invalid_argument("minimax problem: one flag per view and per point expected");
+  }
   for (const ImageObservation& observation : problem.observations) {
     if (observation.view < 0 || observation.view >= problem.num_views() || observation.point < 0 ||
         observation.point >= problem.num_points) {

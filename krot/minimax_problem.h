@@ -19,7 +19,12 @@ struct MinimaxProblem {
   std::vector<Eigen::Matrix3d> R_c_w;
   int num_points = 0;
   std::vector<ImageObservation> observations;
+  // Views and points that stay where a start has them; empty: none. View 0 stays in any case.
+  std::vector<bool> view_fixed;
+  std::vector<bool> point_fixed;
 
+  bool ViewFixed(int view) const { return view == 0 || (!view_fixed.empty() && view_fixed[view]); }
+  bool PointFixed(int point) const { return !point_fixed.empty() && point_fixed[point]; }
   int num_views() const { return static_cast<int>(R_c_w.size()); }
 };
 
@@ -39,7 +44,8 @@ double BoxResidual(const MinimaxProblem& problem,
 /// the optimum, whatever the structure. Zero for no observations.
 double MaxBoxResidual(const MinimaxProblem& problem, const MinimaxStructure& structure);
 
-/// Throws std::invalid_argument when an index is out of range or a number is not finite.
+/// Throws std::invalid_argument when an index is out of range, a number is not finite or the flags
+/// of what is fixed are not as many as views or points.
 void CheckProblem(const MinimaxProblem& problem);
 
 }  // namespace rotslam

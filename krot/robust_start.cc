@@ -39,13 +39,14 @@ MinimaxLpResult SolveProgram(const MinimaxProblem& problem,
                              double gamma,
                              const std::vector<double>& weights,
                              const RobustStartOptions& options,
-                             double tolerance) {
-  if (options.method == "interior") {
+                             double tolerance,
+                             const MinimaxStructure* start) {
+  if (options.method == "interior" || start != nullptr) {
     L1InteriorOptions interior;
     interior.tolerance = tolerance;
     MinimaxLpResult result =
-        SolveL1SlackInterior(problem, gamma, options.depth_price, weights, interior);
-    if (result.call == LpCallStatus::kCompleted) return result;
+        SolveL1SlackInterior(problem, gamma, options.depth_price, weights, interior, start);
+    if (result.call == LpCallStatus::kCompleted || start != nullptr) return result;
   }
   return SolveL1Slack(problem, gamma, options.depth_price, weights, options.lp);
 }
@@ -55,10 +56,11 @@ bool SolveRound(const MinimaxProblem& problem,
                 double gamma,
                 const std::vector<double>& weights,
                 const RobustStartOptions& options,
+                const MinimaxStructure* given,
                 RobustStart& start) {
   // The rounds' answers only set prices.
   const double tolerance = gamma > 0.0 ? 1e-3 : 1e-6;
-  MinimaxLpResult lp = SolveProgram(problem, gamma, weights, options, tolerance);
+  MinimaxLpResult lp = SolveProgram(problem, gamma, weights, options, tolerance, given);
   ++start.num_programs;
   if (lp.call != LpCallStatus::kCompleted) return false;
   start.call = lp.call;
@@ -85,7 +87,8 @@ std::optional<std::string> RobustStartOptions::Problem() const {
 
 RobustStart SolveRobustStart(const MinimaxProblem& problem,
                              double gamma,
-                             const RobustStartOptions& options) {
+                             const RobustStartOptions& options,
+                             const MinimaxStructure* given) {
   if (const auto trouble = options.Problem()) {
     throw std::invalid_argument("RobustStartOptions: " + *trouble);
   }
@@ -93,12 +96,12 @@ RobustStart SolveRobustStart(const MinimaxProblem& problem,
   RobustStart start;
   std::vector<double> weights;
   for (bool done = false; !done && start.num_programs < options.max_rounds;) {
-    if (!SolveRound(problem, gamma, weights, options, start)) return start;
+    if (!SolveRound(problem, gamma, weights, options, given, start)) return start;
     weights = NextWeights(problem, start, gamma);
     // Where nobody pays, no price matters.
     done = *std::max_element(start.residuals.begin(), start.residuals.end()) <= 1.01 * gamma;
   }
-  if (options.use_sharpening) SolveRound(problem, 0.0, weights, options, start);
+  if (options.use_sharpening) SolveRound(problem, 0.0, weights, options, given, start);
   return start;
 }
 

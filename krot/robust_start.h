@@ -46,12 +46,16 @@ struct RobustStart {
 
 /// Structure that misses the bound `gamma` by the least sum, outliers priced down in rounds by
 /// 1 / ((1 + (excess / gamma)^2) depth).
+/// @param start  where the problem's fixed views and points are, when it has any (its smallest
+/// depth
+///               must then be well above one): only "interior" programs hold them.
 /// Source:  Candes, Wakin & Boyd, Enhancing sparsity by reweighted l1 minimization, 2008; ours
 ///          squares the excess and divides by depth, since slack is counted at depth, and ends
 ///          with one program without the bound.
 /// Error:   truth to 1e-6 of the scene's size on clean scenes.
 RobustStart SolveRobustStart(const MinimaxProblem& problem,
                              double gamma,
-                             const RobustStartOptions& options = {});
+                             const RobustStartOptions& options = {},
+                             const MinimaxStructure* start = nullptr);
 
 }  // namespace rotslam

@@ -45,7 +45,15 @@ StructureSystem::StructureSystem(const MinimaxProblem& problem)
       groups_(problem),
       L_point_(problem.num_points) {
   view_of_.reserve(groups_.observations.size());
-  for (const int o : groups_.observations) view_of_.push_back(problem.observations[o].view);
+  for (const int o : groups_.observations) {
+    const int view = problem.observations[o].view;
+    view_of_.push_back(problem.ViewFixed(view) ? 0 : view);
+  }
+  for (int view = 1; view < problem.num_views(); ++view) {
+    if (problem.ViewFixed(view)) fixed_views_.push_back(view);
+  }
+  point_fixed_.reserve(problem.num_points);
+  for (int i = 0; i < problem.num_points; ++i) point_fixed_.push_back(problem.PointFixed(i));
   std::vector<std::vector<int>> members(problem.num_points);
   for (int i = 0; i < problem.num_points; ++i) {
     for (int k = groups_.begin[i]; k < groups_.begin[i + 1]; ++k) {
@@ -71,6 +79,13 @@ void StructureSystem::EliminatePoints(const std::vector<Eigen::Matrix3d>& S, dou
   for (int i = 0; i < layout_.num_points; ++i) {
     const int begin = groups_.begin[i];
     const int end = groups_.begin[i + 1];
+    if (point_fixed_[i]) {
+      for (int k = begin; k < end; ++k) {
+        const int a = view_of_[k] - 1;
+        if (a >= 0) cameras_->Add(a, a, S[groups_.observations[k]]);
+      }
+      continue;
+    }
     Eigen::Matrix3d V = Eigen::Matrix3d::Zero();
     for (int k = begin; k < end; ++k) V += S[groups_.observations[k]];
     const double floor = std::max(kDamping * V.trace(), 1e-300);
@@ -110,6 +125,7 @@ Eigen::VectorXd StructureSystem::Solve(const std::vector<Eigen::Matrix3d>& S,
   const int num_center_rows = 3 * (layout_.num_views - 1);
   Eigen::VectorXd reduced = b.head(num_center_rows);
   for (int i = 0; i < layout_.num_points; ++i) {
+    if (point_fixed_[i]) continue;
     const Eigen::Vector3d from_point = solve_point(i, b.segment<3>(layout_.Point(i)));
     for (int k = groups_.begin[i]; k < groups_.begin[i + 1]; ++k) {
       if (view_of_[k] == 0) continue;
@@ -117,7 +133,12 @@ Eigen::VectorXd StructureSystem::Solve(const std::vector<Eigen::Matrix3d>& S,
     }
   }
   x.head(num_center_rows) = cameras_->Solve(reduced);
+  for (const int view : fixed_views_) x.segment<3>(layout_.Center(view)).setZero();
   for (int i = 0; i < layout_.num_points; ++i) {
+    if (point_fixed_[i]) {
+      x.segment<3>(layout_.Point(i)).setZero();
+      continue;
+    }
     Eigen::Vector3d right = b.segment<3>(layout_.Point(i));
     for (int k = groups_.begin[i]; k < groups_.begin[i + 1]; ++k) {
       if (view_of_[k] == 0) continue;

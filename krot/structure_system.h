@@ -28,10 +28,11 @@ struct PointGroups {
 
 class CameraSystem;
 
-/// Linear systems with the structure of bundle adjustment: H is the sum over the observations of
-/// (X - c) -> S (X - c) with 3 x 3 positive semidefinite S. Points are eliminated one by one; the
-/// system of the centres is factored by tiles, of which only those that fill in exist.
-/// Cost:    sum of squared track lengths to assemble; the centres' factor is linear in the views
+/// Linear systems with the structure of bundle adjustment; what the problem holds fixed has its
+/// place in the vectors, and zero in the solutions. H is the sum over the observations of (X - c)
+/// -> S (X - c) with 3 x 3 positive semidefinite S. Points are eliminated one by one; the system of
+/// the centres is factored by tiles, of which only those that fill in exist. Cost:    sum of
+/// squared track lengths to assemble; the centres' factor is linear in the views
 ///          for a drive, cubic where every two views share points.
 class StructureSystem {
  public:
@@ -53,7 +54,9 @@ class StructureSystem {
 
   StructureLayout layout_;
   PointGroups groups_;
-  std::vector<int> view_of_;  // of each observation, in the groups' order
+  std::vector<int> view_of_;  // of each observation, in the groups' order; 0 for a fixed one
+  std::vector<int> fixed_views_;
+  std::vector<bool> point_fixed_;
   std::vector<Eigen::Matrix3d> L_point_;
   std::unique_ptr<CameraSystem> cameras_;
 };

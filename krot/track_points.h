@@ -1,0 +1,39 @@
+#pragma once
+
+#include <optional>
+#include <vector>
+
+#include "krot/known_rotation.h"
+#include "krot/krot_options.h"
+
+namespace rotslam {
+
+/// Throws std::invalid_argument where SolveKnownRotation's contract is broken.
+void RequireContract(const RotationMap& cam_from_world,
+                     const std::vector<Track>& tracks,
+                     const Camera& camera,
+                     const KrotOptions& options);
+
+/// Tracks without unusable observations, frames ascending; same order as the input, short ones
+/// kept.
+std::vector<Track> CleanTracks(const std::vector<Track>& tracks,
+                               std::vector<RemovedObservation>& removed);
+
+/// A track's point and the views that disagree.
+struct TrackPoint {
+  Eigen::Vector3d point_in_world;
+  std::vector<FrameId> outliers;
+};
+using TrackPoints = std::vector<std::optional<TrackPoint>>;  // by track position
+
+/// Points of all tracks from the centres of some views.
+/// @param thresholds  of each track, largest bearing error of a right observation, rad; counted
+///                    options.loose_factor times.
+TrackPoints TriangulateAll(const RotationMap& cam_from_world,
+                           const CenterMap& centers,
+                           const std::vector<Track>& tracks,
+                           const std::vector<double>& thresholds,
+                           const KrotOptions& options,
+                           const KrotUnits& units);
+
+}  // namespace rotslam
