@@ -1,6 +1,8 @@
 // The test for a baseline: how often it fails where there is none, and what it finds where there
 // is one.
 
+#include "rotodom/relative_rotation/baseline_evidence.h"
+
 #include <cmath>
 #include <random>
 #include <stdexcept>
@@ -9,7 +11,6 @@
 
 #include <gtest/gtest.h>
 
-#include "rotodom/relative_rotation/baseline_evidence.h"
 #include "tests/rotodom/relative_rotation/pair_scene.h"
 
 namespace rotslam {
