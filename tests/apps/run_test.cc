@@ -164,8 +164,7 @@ TEST_P(OnBothSequences, SummarySaysWhatWasDone) {
   EXPECT_EQ(summary["command"], "run");
   EXPECT_EQ(summary["counts"]["frames"], kNumFrames);
   EXPECT_EQ(summary["counts"]["unreadable_frames"], 0);
-  EXPECT_EQ(summary["counts"]["keyframes"],
-            ReadTrajectory(Out() / "keyframes_tum.txt").size());
+  EXPECT_EQ(summary["counts"]["keyframes"], ReadTrajectory(Out() / "keyframes_tum.txt").size());
   EXPECT_LE(CountPlyPoints(Out() / "cloud.ply"), summary["counts"]["points"].get<std::int64_t>());
   EXPECT_EQ(summary["krot"]["status"], "converged");
   EXPECT_LE(summary["krot"]["gamma_low"].get<double>(),
