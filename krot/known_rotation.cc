@@ -88,7 +88,7 @@ struct KeptProblem {
 KeptProblem TakeKept(const RotationMap& cam_from_world,
                      const CenterMap& centers,
                      const std::vector<Track>& tracks,
-                     const TrackPoints& points,
+                     const TriangulatedTracks& points,
                      double min_z) {
   KeptProblem kept;
   std::vector<Track> kept_tracks;
@@ -141,7 +141,7 @@ void TakeCenters(const std::vector<FrameId>& views,
 // ended.
 BisectionStatus BoundResidual(const RotationMap& cam_from_world,
                               const std::vector<Track>& tracks,
-                              const TrackPoints& points,
+                              const TriangulatedTracks& points,
                               const KrotOptions& options,
                               const KrotUnits& units,
                               CenterMap& centers,
@@ -174,7 +174,7 @@ BisectionStatus BoundResidual(const RotationMap& cam_from_world,
 }
 
 // Moves a component to its gauge: first centre at the origin, median depth one.
-void Normalise(CenterMap& centers, const std::vector<Track>& tracks, TrackPoints& points) {
+void Normalise(CenterMap& centers, const std::vector<Track>& tracks, TriangulatedTracks& points) {
   std::vector<double> depths;
   for (std::size_t t = 0; t < tracks.size(); ++t) {
     if (!points[t]) continue;
@@ -217,7 +217,7 @@ std::optional<BisectionStatus> SolveComponent(const RotationMap& cam_from_world,
   const auto triangulate = [&] {
     return TriangulateAll(cam_from_world, centers, tracks, thresholds, options, units);
   };
-  TrackPoints points = triangulate();
+  TriangulatedTracks points = triangulate();
   const BisectionStatus bracket =
       BoundResidual(cam_from_world, tracks, points, options, units, centers, solution);
   if (options.start == "bisection") points = triangulate();

@@ -58,13 +58,13 @@ std::vector<Track> CleanTracks(const std::vector<Track>& tracks,
   return clean;
 }
 
-TrackPoints TriangulateAll(const RotationMap& cam_from_world,
+TriangulatedTracks TriangulateAll(const RotationMap& cam_from_world,
                            const CenterMap& centers,
                            const std::vector<Track>& tracks,
                            const std::vector<double>& thresholds,
                            const KrotOptions& options,
                            const KrotUnits& units) {
-  TrackPoints points(tracks.size());
+  TriangulatedTracks points(tracks.size());
   ParallelFor(static_cast<int>(tracks.size()), options.num_threads, [&](int t) {
     std::vector<int> observations;
     const std::vector<Sighting> sightings =
@@ -72,7 +72,7 @@ TrackPoints TriangulateAll(const RotationMap& cam_from_world,
     const auto robust =
         TriangulateRobustly(sightings, units.point_angle_rad, options.loose_factor * thresholds[t]);
     if (!robust) return;
-    TrackPoint point{robust->point_in_world, {}};
+    TriangulatedTrack point{robust->point_in_world, {}};
     std::size_t next = 0;
     for (int k = 0; k < static_cast<int>(sightings.size()); ++k) {
       if (next < robust->inliers.size() && robust->inliers[next] == k) {

@@ -20,16 +20,16 @@ std::vector<Track> CleanTracks(const std::vector<Track>& tracks,
                                std::vector<RemovedObservation>& removed);
 
 /// A track's point and the views that disagree.
-struct TrackPoint {
+struct TriangulatedTrack {
   Eigen::Vector3d point_in_world;
   std::vector<FrameId> outliers;
 };
-using TrackPoints = std::vector<std::optional<TrackPoint>>;  // by track position
+using TriangulatedTracks = std::vector<std::optional<TriangulatedTrack>>;  // by track position
 
 /// Points of all tracks from the centres of some views.
 /// @param thresholds  of each track, largest bearing error of a right observation, rad; counted
 ///                    options.loose_factor times.
-TrackPoints TriangulateAll(const RotationMap& cam_from_world,
+TriangulatedTracks TriangulateAll(const RotationMap& cam_from_world,
                            const CenterMap& centers,
                            const std::vector<Track>& tracks,
                            const std::vector<double>& thresholds,

@@ -177,7 +177,7 @@ void TakeNewPoints(const RotationMap& cam_from_world,
                    const KrotUnits& units,
                    KrotSolution& solution) {
   const std::vector<double> thresholds(tracks.size(), units.gamma);
-  const TrackPoints points =
+  const TriangulatedTracks points =
       TriangulateAll(cam_from_world, centers, tracks, thresholds, options, units);
   double largest = 0.0;
   for (std::size_t t = 0; t < tracks.size(); ++t) {
