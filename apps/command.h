@@ -36,6 +36,7 @@ void AddRotationsCommand(CLI::App& app, Action& action);
 void AddSolveCommand(CLI::App& app, Action& action);
 void AddSimulateCommand(CLI::App& app, Action& action);
 void AddAverageCommand(CLI::App& app, Action& action);
+void AddBatchCommand(CLI::App& app, Action& action);
 void AddEvalCommand(CLI::App& app, Action& action);
 void AddExportCommand(CLI::App& app, Action& action);
 void AddPanoramaCommand(CLI::App& app, Action& action);

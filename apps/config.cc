@@ -152,29 +152,34 @@ class Loader {
   const Vocabulary& vocabulary_;
 };
 
-YAML::Node ReadYaml(const std::filesystem::path& path) {
+}  // namespace
+
+YAML::Node ReadYaml(const std::filesystem::path& path, const std::string& what) {
   std::error_code ignored;
   if (std::filesystem::is_directory(path, ignored)) {
-    throw std::runtime_error(path.string() + ": is a folder, not an options file");
+    throw std::runtime_error(path.string() + ": is a folder, not the " + what);
   }
   try {
     return YAML::LoadFile(path.string());
   } catch (const YAML::BadFile&) {
-    throw std::runtime_error(path.string() + ": cannot read the options file");
+    throw std::runtime_error(path.string() + ": cannot read the " + what);
   } catch (const YAML::ParserException& error) {
     throw std::runtime_error(AtLine(path, error.mark.line + 1, "not YAML: " + error.msg));
   }
 }
 
-}  // namespace
-
 void OverrideOptions(const std::filesystem::path& path, const std::vector<OptionRef>& options) {
-  const YAML::Node root = ReadYaml(path);
-  if (!root.IsDefined() || root.IsNull()) return;
+  OverrideOptions(path, ReadYaml(path, "options file"), options);
+}
+
+void OverrideOptions(const std::filesystem::path& path,
+                     const YAML::Node& map,
+                     const std::vector<OptionRef>& options) {
+  if (!map.IsDefined() || map.IsNull()) return;
   const Vocabulary vocabulary(options);
   const Loader loader(path, vocabulary);
-  if (!root.IsMap()) loader.Refuse(root, "expected options as `name: value`");
-  loader.LoadGroup(root, "");
+  if (!map.IsMap()) loader.Refuse(map, "expected options as `name: value`");
+  loader.LoadGroup(map, "");
 }
 
 }  // namespace rotslam

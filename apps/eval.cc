@@ -1,17 +1,14 @@
-#include <cmath>
 #include <cstdio>
 #include <memory>
 #include <optional>
-#include <stdexcept>
 #include <string>
-#include <vector>
 
 #include <nlohmann/json.hpp>
 
 #include "apps/command.h"
 #include "apps/config.h"
+#include "apps/evaluation.h"
 #include "output/metrics.h"
-#include "output/trajectory.h"
 
 namespace rotslam {
 namespace {
@@ -25,32 +22,6 @@ struct EvalFlags {
   std::optional<double> max_gap_s;
   bool json = false;
 };
-
-// Estimated poses with ground truth per image, to four decimals.
-std::optional<double> Coverage(const TrajectoryMetrics& metrics, int num_images) {
-  if (num_images == 0) return std::nullopt;
-  return std::round(1e4 * metrics.num_poses / num_images) / 1e4;
-}
-
-nlohmann::ordered_json OrNull(const std::optional<double>& value) {
-  return value ? nlohmann::ordered_json(*value) : nlohmann::ordered_json();
-}
-
-void PrintJson(const TrajectoryMetrics& metrics, int num_images) {
-  const nlohmann::ordered_json json = {{"n", metrics.num_poses},
-                                       {"images", num_images},
-                                       {"coverage", OrNull(Coverage(metrics, num_images))},
-                                       {"rpe1", metrics.rpe1_deg},
-                                       {"rpe1_median", metrics.rpe1_median_deg},
-                                       {"rpe1_p90", metrics.rpe1_p90_deg},
-                                       {"rpe1_max", metrics.rpe1_max_deg},
-                                       {"rpen", metrics.rpen_deg},
-                                       {"r_err", OrNull(metrics.r_err_deg_per_100m)},
-                                       {"ate", OrNull(metrics.ate_m)},
-                                       {"scale", OrNull(metrics.scale)},
-                                       {"path_length", metrics.path_length_m}};
-  std::printf("%s\n", json.dump().c_str());
-}
 
 void PrintRow(const char* name, const std::string& value, const char* meaning) {
   std::printf("%-14s %12s  %s\n", name, value.c_str(), meaning);
@@ -90,18 +61,10 @@ int Eval(const EvalFlags& flags) {
   if (flags.max_gap_s) options.max_gap_s = *flags.max_gap_s;
   std::optional<std::filesystem::path> times;
   if (!flags.times.empty()) times = flags.times;
-  const Trajectory ground_truth = ReadTrajectory(flags.ground_truth, times);
-  const Trajectory estimate = ReadTrajectory(flags.estimate, times);
-  const std::vector<PosePair> pairs = AssociatePoses(ground_truth, estimate, options);
-  if (pairs.size() < 3) {
-    throw std::runtime_error(flags.estimate + ": only " + std::to_string(pairs.size()) + " of " +
-                             std::to_string(estimate.size()) + " poses have ground truth in " +
-                             flags.ground_truth +
-                             ": do the timestamps agree? KITTI files take theirs from --times");
-  }
-  const TrajectoryMetrics metrics = ComputeMetrics(pairs, options);
+  const TrajectoryMetrics metrics =
+      CompareTrajectoryFiles(flags.ground_truth, flags.estimate, times, options);
   if (flags.json) {
-    PrintJson(metrics, flags.num_images);
+    std::printf("%s\n", MetricsJson(metrics, flags.num_images).dump().c_str());
   } else {
     PrintTable(metrics, flags.num_images);
   }

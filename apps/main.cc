@@ -62,6 +62,7 @@ int main(int argc, char** argv) {
     rotslam::AddSimulateCommand(app, action);
     rotslam::AddPanoramaCommand(app, action);
     rotslam::AddVocabularyCommand(app, action);
+    rotslam::AddBatchCommand(app, action);
     try {
       app.parse(argc, argv);
     } catch (const CLI::Success& help) {

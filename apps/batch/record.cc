@@ -1,0 +1,184 @@
+#include "apps/batch/record.h"
+
+#include <cstring>
+#include <fstream>
+#include <iterator>
+#include <stdexcept>
+
+#include <nlohmann/json.hpp>
+
+#include "apps/evaluation.h"
+#include "output/atomic_file.h"
+#include "output/option_list.h"
+#include "output/summary.h"
+
+namespace rotslam {
+namespace {
+
+namespace fs = std::filesystem;
+using Json = nlohmann::ordered_json;
+
+constexpr const char* kRecordFile = "batch.json";
+
+// The place of a dotted key, made on the way where it does not exist.
+Json& At(Json& object, const std::string& key) {
+  const std::size_t dot = key.find('.');
+  if (dot == std::string::npos) return object[key];
+  return At(object[key.substr(0, dot)], key.substr(dot + 1));
+}
+
+Json OptionsOf(const BatchEntry& entry) {
+  Json options = Json::object();
+  for (const OptionEntry& option : DescribeOptions(entry.options)) {
+    At(options, option.key) =
+        std::visit([](const auto& value) { return Json(value); }, option.value);
+  }
+  return options;
+}
+
+// nullopt where there is no such file, or not a whole one.
+std::optional<Json> ReadObject(const fs::path& path) {
+  std::ifstream file(path, std::ios::binary);
+  if (!file) return std::nullopt;
+  Json json = Json::parse(file, nullptr, false);
+  if (!json.is_object()) return std::nullopt;
+  return json;
+}
+
+std::optional<std::int64_t> Count(const Json& summary, const char* name) {
+  const Json counts = summary.value("counts", Json::object());
+  const auto found = counts.find(name);
+  if (found == counts.end() || !found->is_number()) return std::nullopt;
+  return found->get<std::int64_t>();
+}
+
+fs::path EstimateOf(const BatchEntry& entry, const fs::path& directory) {
+  return directory / (entry.command == "run" ? "trajectory_tum.txt" : "rotations_tum.txt");
+}
+
+void AddMetrics(const BatchEntry& entry,
+                const fs::path& directory,
+                int num_threads,
+                BatchResult& result) {
+  MetricsOptions options;
+  options.num_threads = num_threads;
+  std::optional<fs::path> times;
+  if (!entry.times.empty()) times = entry.times;
+  try {
+    const TrajectoryMetrics metrics =
+        CompareTrajectoryFiles(entry.ground_truth, EstimateOf(entry, directory), times, options);
+    result.coverage = Coverage(metrics, static_cast<int>(result.frames.value_or(0)));
+    result.rpe1_deg = metrics.rpe1_deg;
+    result.rpen_deg = metrics.rpen_deg;
+    result.ate = metrics.ate_m;
+  } catch (const std::runtime_error& error) {
+    if (result.note.empty()) result.note = error.what();
+  }
+}
+
+}  // namespace
+
+std::string RequestOf(const BatchEntry& entry, std::uint64_t seed) {
+  return Json({{"version", Version()},
+               {"command", entry.command},
+               {"path", entry.path},
+               {"camera", entry.camera},
+               {"rotations", entry.rotations},
+               {"vocabulary", entry.vocabulary},
+               {"seed", seed},
+               {"options", OptionsOf(entry)}})
+      .dump();
+}
+
+std::string OptionsFileOf(const BatchEntry& entry) { return OptionsOf(entry).dump(2) + "\n"; }
+
+std::optional<BatchRecord> ReadRecord(const fs::path& directory) {
+  const std::optional<Json> json = ReadObject(directory / kRecordFile);
+  if (!json) return std::nullopt;
+  try {
+    BatchRecord record;
+    record.request = json->at("request").dump();
+    record.end.exit_code = json->at("exit_code").get<int>();
+    record.end.cpu_s = json->at("cpu_s").get<double>();
+    record.end.wall_s = json->at("wall_s").get<double>();
+    record.end.max_memory_kb = json->at("max_memory_kb").get<std::int64_t>();
+    record.error = json->at("error").get<std::string>();
+    return record;
+  } catch (const Json::exception&) {
+    return std::nullopt;
+  }
+}
+
+void WriteRecord(const fs::path& directory, const BatchRecord& record) {
+  const Json json = {{"exit_code", record.end.exit_code},
+                     {"error", record.error},
+                     {"cpu_s", record.end.cpu_s},
+                     {"wall_s", record.end.wall_s},
+                     {"max_memory_kb", record.end.max_memory_kb},
+                     {"request", Json::parse(record.request)}};
+  // A child may print any bytes.
+  ReplaceFile(directory / kRecordFile,
+              json.dump(2, ' ', false, Json::error_handler_t::replace) + "\n");
+}
+
+bool IsFinished(const fs::path& directory, const std::string& request) {
+  const std::optional<BatchRecord> record = ReadRecord(directory);
+  return record && record->end.exit_code == 0 && record->request == request &&
+         ReadObject(directory / "summary.json").has_value();
+}
+
+std::string LastErrorLine(const fs::path& log) {
+  const std::string kProgram = "rotslam: ";
+  const std::string kWarning = "rotslam: warning: ";
+  std::string last;
+  std::string error;
+  std::ifstream file(log);
+  for (std::string line; std::getline(file, line);) {
+    if (line.empty()) continue;
+    if (line.starts_with(kProgram) && !line.starts_with(kWarning)) {
+      error = line.substr(kProgram.size());
+    }
+    last = line;
+  }
+  return error.empty() ? last : error;
+}
+
+std::string ReasonOf(const BatchRecord& record) {
+  const int code = record.end.exit_code;
+  if (code == 0) return "";
+  const std::string how =
+      code > 128 ? "signal " + std::to_string(code - 128) : "exit code " + std::to_string(code);
+  return record.error.empty() ? how : how + ": " + record.error;
+}
+
+BatchResult ResultOf(const BatchEntry& entry,
+                     const fs::path& directory,
+                     const std::string& request,
+                     int num_threads) {
+  BatchResult result;
+  result.name = entry.name;
+  const std::optional<BatchRecord> record = ReadRecord(directory);
+  if (!record) {
+    result.status = "not run";
+    return result;
+  }
+  if (record->request != request) {
+    result.status = "outdated";
+    result.note = "ran with other options, paths or another version";
+    return result;
+  }
+  result.cpu_s = record->end.cpu_s;
+  result.note = ReasonOf(*record);
+  const std::optional<Json> summary = ReadObject(directory / "summary.json");
+  result.status = record->end.exit_code == 0 && summary ? "done" : "failed";
+  if (!summary) {
+    if (result.note.empty()) result.note = "summary.json is missing or not whole";
+    return result;
+  }
+  result.frames = Count(*summary, "frames");
+  result.points = Count(*summary, "points");
+  if (!entry.ground_truth.empty()) AddMetrics(entry, directory, num_threads, result);
+  return result;
+}
+
+}  // namespace rotslam

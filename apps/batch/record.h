@@ -1,0 +1,62 @@
+#pragma once
+
+#include <cstdint>
+#include <filesystem>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "apps/batch/children.h"
+#include "apps/batch/list.h"
+
+namespace rotslam {
+
+/// What a batch was asked to do with one sequence: all that its result depends on, as one line of
+/// JSON. Equal requests have equal results.
+std::string RequestOf(const BatchEntry& entry, std::uint64_t seed);
+
+/// The request's options as a file for --config; JSON is YAML, too.
+std::string OptionsFileOf(const BatchEntry& entry);
+
+/// How one sequence went: batch.json in the folder of its results.
+struct BatchRecord {
+  std::string request;
+  ChildEnd end;
+  std::string error;  // the line that says why it failed
+};
+
+/// nullopt where there is no record, or not a whole one.
+std::optional<BatchRecord> ReadRecord(const std::filesystem::path& directory);
+/// Throws std::runtime_error naming the file when it cannot be written.
+void WriteRecord(const std::filesystem::path& directory, const BatchRecord& record);
+
+/// Whether this very request has been met, its results being whole.
+bool IsFinished(const std::filesystem::path& directory, const std::string& request);
+
+/// The last line of a log that reports an error, without "rotslam: "; else the last line.
+std::string LastErrorLine(const std::filesystem::path& log);
+
+/// "exit code 1: seq: no such folder", "signal 9"; empty where all went well.
+std::string ReasonOf(const BatchRecord& record);
+
+/// One line of the table. Missing figures are not known, or the sequence has none.
+struct BatchResult {
+  std::string name;
+  std::optional<std::int64_t> frames;
+  std::optional<double> coverage;  // share of the frames whose pose has ground truth
+  std::optional<double> rpe1_deg;
+  std::optional<double> rpen_deg;
+  std::optional<double> ate;  // in the ground truth's unit, metres
+  std::optional<std::int64_t> points;
+  std::optional<double> cpu_s;
+  std::string status;  // "done", "failed", "not run", "outdated": ran with another request
+  std::string note;    // why it failed, or could not be compared
+};
+
+/// Reads what a run has left in `directory` and compares it with the entry's ground truth.
+BatchResult ResultOf(const BatchEntry& entry,
+                     const std::filesystem::path& directory,
+                     const std::string& request,
+                     int num_threads);
+
+}  // namespace rotslam
