@@ -67,6 +67,12 @@ struct Vocabulary {
         });
     return nearest == candidates.end() ? std::string() : *nearest;
   }
+
+  std::string Unknown(const std::string& key) const {
+    const std::string nearest = Nearest(key);
+    return "no option is called \"" + key + "\"" +
+           (nearest.empty() ? "" : "; the nearest one is \"" + nearest + "\"");
+  }
 };
 
 std::string Shown(const YAML::Node& node) {
@@ -132,10 +138,7 @@ class Loader {
     }
     const auto option = vocabulary_.option_of.find(key);
     if (option == vocabulary_.option_of.end()) {
-      const std::string nearest = vocabulary_.Nearest(key);
-      Refuse(name,
-             "no option is called \"" + key + "\"" +
-                 (nearest.empty() ? "" : "; the nearest one is \"" + nearest + "\""));
+      Refuse(name, vocabulary_.Unknown(key));
     }
     std::visit(
         [&](auto* field) {
@@ -166,6 +169,10 @@ YAML::Node ReadYaml(const std::filesystem::path& path, const std::string& what) 
   } catch (const YAML::ParserException& error) {
     throw std::runtime_error(AtLine(path, error.mark.line + 1, "not YAML: " + error.msg));
   }
+}
+
+std::string UnknownOption(const std::string& key, const std::vector<OptionRef>& options) {
+  return Vocabulary(options).Unknown(key);
 }
 
 void OverrideOptions(const std::filesystem::path& path, const std::vector<OptionRef>& options) {

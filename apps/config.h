@@ -18,6 +18,9 @@ namespace rotslam {
 /// not YAML. `what` says what the file should be ("options file").
 YAML::Node ReadYaml(const std::filesystem::path& path, const std::string& what);
 
+/// 'no option is called "matching.radius"; the nearest one is "matching.radius_px"'.
+std::string UnknownOption(const std::string& key, const std::vector<OptionRef>& options);
+
 /// Overrides the listed options by a YAML file whose maps are the options' groups:
 /// `matching: {max_distance: 60}` sets "matching.max_distance". The file may be empty.
 /// Throws std::runtime_error with file, line and reason: not YAML, a key that no option has (names

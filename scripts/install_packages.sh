@@ -14,8 +14,10 @@ packages=(
   coinor-libclp-dev libceres-dev libgoogle-glog-dev
   # output and apps
   libcli11-dev libpcl-dev libsqlite3-dev nlohmann-json3-dev
-  # tests; GLPK and OpenGV to compare with, numpy for the independent check of `rotslam eval`
-  libglpk-dev libgmock-dev libgtest-dev libopengv-dev python3-numpy
+  # Python module; numpy also for the independent check of `rotslam eval`
+  pybind11-dev python3-dev python3-numpy
+  # tests; GLPK and OpenGV to compare with
+  libglpk-dev libgmock-dev libgtest-dev libopengv-dev
 )
 # Not needed: libbenchmark-dev, for the benchmarks (ROTSLAM_BUILD_BENCHMARKS).
 if [[ ${1:-} == --ci ]]; then

@@ -1,0 +1,265 @@
+"""The Python module against the program and against scenes whose truth is known."""
+import json
+import os
+import subprocess
+import tempfile
+import threading
+import unittest
+from pathlib import Path
+
+import numpy as np
+import rotslam
+
+PROGRAM = os.environ["ROTSLAM_EXECUTABLE"]
+
+
+def run_program(*arguments):
+    return subprocess.run([PROGRAM, *map(str, arguments)], check=True, capture_output=True).stdout
+
+
+def rows_of(orientations, timestamps):
+    rows = np.zeros((len(timestamps), 8))
+    rows[:, 0] = timestamps
+    rows[:, 4:] = [orientations[frame] for frame in range(len(timestamps))]
+    return rows
+
+
+class OnASequence(unittest.TestCase):
+    @classmethod
+    def setUpClass(cls):
+        cls.temporary = tempfile.TemporaryDirectory()
+        cls.folder = Path(cls.temporary.name)
+        cls.sequence = cls.folder / "sequence"
+        run_program("simulate", "handheld", "--frames=24", "--width=320", "--height=240",
+                    "--quiet", "--out", cls.sequence)
+
+    @classmethod
+    def tearDownClass(cls):
+        cls.temporary.cleanup()
+
+    def add_all(self, **odometry_options):
+        sequence = rotslam.Sequence(self.sequence)
+        odometry = rotslam.Odometry(sequence.camera, **odometry_options)
+        orientations, timestamps, last = {}, [], None
+        for image, timestamp in sequence:
+            last = odometry.add(image, timestamp)
+            np.testing.assert_array_equal(last.window[len(timestamps)], last.world_from_cam)
+            orientations.update(last.window)
+            timestamps.append(timestamp)
+        self.assertEqual(odometry.num_frames, sequence.num_frames)
+        return orientations, timestamps, last
+
+    def test_same_orientations_as_the_program(self):
+        run_program("rotations", self.sequence, "--no-loops", "--quiet", "--out",
+                    self.folder / "rotations")
+        expected = np.loadtxt(self.folder / "rotations/rotations_tum.txt")
+        orientations, timestamps, last = self.add_all(threads=2)
+        found = rows_of(orientations, timestamps)
+        self.assertEqual(found.shape, expected.shape)
+        np.testing.assert_allclose(found[:, 4:], expected[:, 4:], rtol=0, atol=1e-12)
+        self.assertEqual(last.covariance.shape, (3, 3))
+        self.assertTrue(np.all(np.linalg.eigvalsh(last.covariance) > 0))
+        np.testing.assert_allclose(last.covariance, last.covariance.T)
+
+    def test_options_reach_the_odometry(self):
+        plain, _, _ = self.add_all()
+        other, _, _ = self.add_all(options={"averaging": {"mode": "off"}})
+        self.assertGreater(np.abs(plain[23] - other[23]).max(), 1e-9)
+
+    def test_evaluate_gives_the_numbers_of_eval(self):
+        orientations, timestamps, _ = self.add_all()
+        rows = rows_of(orientations, timestamps)
+        file = self.folder / "estimate.txt"
+        np.savetxt(file, rows, fmt="%.17g")
+        truth = self.sequence / "groundtruth_tum.txt"
+        expected = json.loads(run_program("eval", truth, file, "--images", 24, "--json"))
+        self.assertEqual(rotslam.evaluate(truth, file, images=24), expected)
+        self.assertEqual(rotslam.evaluate(str(truth), rows, images=24), expected)
+        self.assertIsNone(expected["ate"])
+        self.assertEqual(expected["coverage"], 1.0)
+        with self.assertRaisesRegex(RuntimeError, "poses have ground truth in"):
+            rotslam.evaluate(truth, rows + np.eye(8)[0] * 1e6)
+        with self.assertRaisesRegex(RuntimeError, "none.txt"):
+            rotslam.evaluate(truth, self.folder / "none.txt")
+        with self.assertRaisesRegex(ValueError, r"estimate must be .* \[n, 8\].*\(24, 7\)"):
+            rotslam.evaluate(truth, rows[:, :7])
+        with self.assertRaisesRegex(ValueError, "timestamps must ascend"):
+            rotslam.evaluate(truth, rows[::-1])
+
+    def test_wrong_images_are_refused_and_do_no_harm(self):
+        sequence = rotslam.Sequence(self.sequence)
+        odometry = rotslam.Odometry(sequence.camera)
+        image, timestamp = next(sequence)
+        for wrong in (image.astype(float), image.astype(np.int8), image[:-1], image[:, :, None],
+                      image.tolist()):
+            with self.assertRaisesRegex(ValueError, "image must"):
+                odometry.add(wrong, timestamp)
+        with self.assertRaisesRegex(ValueError, "timestamp is nan"):
+            odometry.add(image, float("nan"))
+        odometry.add(image, timestamp)
+        with self.assertRaisesRegex(ValueError, "must be above the last one"):
+            odometry.add(image, timestamp)
+        self.assertEqual(odometry.num_frames, 1)
+        self.assertIn("predicted", odometry.add(None, timestamp + 0.1).flags)
+
+    def test_images_may_be_views_and_may_change_afterwards(self):
+        expected, _, _ = self.add_all()
+        sequence = rotslam.Sequence(self.sequence)
+        odometry = rotslam.Odometry(sequence.camera)
+        buffer = np.zeros((240, 640), np.uint8)
+        found = {}
+        for image, timestamp in sequence:
+            buffer[:, ::2] = image
+            found.update(odometry.add(buffer[:, ::2], timestamp).window)
+            buffer[:] = 0
+        for frame, quaternion in expected.items():
+            np.testing.assert_array_equal(found[frame], quaternion)
+
+    def test_other_threads_run_meanwhile(self):
+        frames = list(rotslam.Sequence(self.sequence))
+        camera = rotslam.Sequence(self.sequence).camera
+        ticks = []
+        done = threading.Event()
+
+        def tick():
+            while not done.is_set():
+                ticks.append(None)
+                done.wait(0.001)
+
+        ticker = threading.Thread(target=tick)
+        odometry = rotslam.Odometry(camera)
+        ticker.start()
+        # A call that kept the lock would let the other thread in between calls only.
+        during = 0
+        for image, timestamp in frames:
+            before = len(ticks)
+            odometry.add(image, timestamp)
+            during = max(during, len(ticks) - before)
+        done.set()
+        ticker.join()
+        self.assertGreater(during, 3)
+
+    def test_calibrations_without_a_size(self):
+        file = self.folder / "calib.txt"
+        file.write_text("P0: 250 0 160 0 0 250 120 0 0 0 1 0\n")
+        with self.assertRaisesRegex(ValueError, "give read_camera the width and height"):
+            rotslam.Odometry(rotslam.read_camera(file))
+        self.assertEqual(rotslam.read_camera(file, 320, 240).width, 320)
+        with self.assertRaisesRegex(RuntimeError, "640"):
+            rotslam.read_camera(self.sequence / "camera.yaml", 640, 480)
+
+    def test_world_errors_are_runtime_errors(self):
+        with self.assertRaisesRegex(RuntimeError, "nowhere"):
+            rotslam.Sequence(self.folder / "nowhere")
+        with self.assertRaisesRegex(RuntimeError, "nowhere.yaml"):
+            rotslam.read_camera(self.folder / "nowhere.yaml")
+
+
+class OptionsAndCameras(unittest.TestCase):
+    camera = rotslam.Camera(fx=250, fy=250, cx=160, cy=120, width=320, height=240)
+
+    def refusal(self, **options):
+        with self.assertRaises(ValueError) as context:
+            rotslam.Odometry(self.camera, **options)
+        return str(context.exception)
+
+    def test_wrong_options(self):
+        self.assertIn('nearest one is "averaging.mode"',
+                      self.refusal(options={"averaging": {"mod": "off"}}))
+        self.assertIn("averaging.mode", self.refusal(options={"averaging": {"mode": "of"}}))
+        self.assertIn('"features.max_features" expects a whole number, found 1.5',
+                      self.refusal(options={"features": {"max_features": 1.5}}))
+        self.assertIn("a whole number", self.refusal(options={"features": {"max_features": 10**30}}))
+        self.assertIn("a whole number", self.refusal(options={"features": {"max_features": True}}))
+        self.assertIn("must be a dict", self.refusal(options=[1]))
+        self.assertIn("threads is 0", self.refusal(threads=0))
+
+    def test_cameras(self):
+        camera = rotslam.Camera(250, 251, 160, 120, 320, 240, "radtan", [0.1, 0.2])
+        self.assertEqual((camera.model, camera.fy, camera.distortion),
+                         ("radtan", 251, [0.1, 0.2, 0, 0, 0]))
+        for wrong in ({"fx": -1}, {"model": "fisheye"}, {"distortion": [0] * 6}):
+            with self.assertRaises(ValueError):
+                rotslam.Camera(**{"fx": 250, "fy": 250, "cx": 160, "cy": 120, "width": 320,
+                                  "height": 240, **wrong})
+
+
+class KnownRotations(unittest.TestCase):
+    camera = rotslam.Camera(fx=700, fy=700, cx=640, cy=480, width=1280, height=960)
+
+    def scene(self, noise_px):
+        random = np.random.default_rng(3)
+        points = random.uniform([-3, -2, 5], [3, 2, 9], (80, 3))
+        centers = np.column_stack([np.linspace(0, 2, 7), 0.3 * np.sin(np.arange(7)),
+                                   0.2 * np.cos(np.arange(7))])
+        angles = 0.05 * np.arange(7)
+        cam_from_world = np.array([[[np.cos(a), 0, -np.sin(a)], [0, 1, 0],
+                                    [np.sin(a), 0, np.cos(a)]] for a in angles])
+        view, track = (index.ravel() for index in np.meshgrid(np.arange(7), np.arange(80)))
+        in_camera = np.einsum("kij,kj->ki", cam_from_world[view], points[track] - centers[view])
+        pixels = 700 * in_camera[:, :2] / in_camera[:, 2:] + [640, 480]
+        pixels += random.uniform(-noise_px, noise_px, pixels.shape)
+        # In no order, and ids with gaps.
+        order = random.permutation(len(view))
+        return (centers, points,
+                (cam_from_world, view[order], 10 * track[order] + 3, pixels[order], self.camera))
+
+    def test_clean_scene(self):
+        centers, points, arguments = self.scene(0)
+        solution = rotslam.solve_known_rotation(*arguments)
+        self.assertEqual(solution["status"], "converged")
+        # Origin and scale are free.
+        scale = np.linalg.norm(centers[6] - centers[0]) / np.linalg.norm(
+            solution["centers"][6] - solution["centers"][0])
+        shift = centers[0] - scale * solution["centers"][0]
+        np.testing.assert_allclose(scale * solution["centers"] + shift, centers, atol=1e-5)
+        np.testing.assert_array_equal(solution["point_ids"], 10 * np.arange(80) + 3)
+        np.testing.assert_allclose(scale * solution["points"] + shift, points, atol=1e-4)
+        np.testing.assert_array_equal(solution["component"], 0)
+        self.assertLess(solution["gamma_high"], 1e-6)
+
+    def test_bracket(self):
+        _, _, arguments = self.scene(1.0)
+        solution = rotslam.solve_known_rotation(
+            *arguments, options={"bisection": {"relative_gap": 0.01}}, threads=2)
+        low, high = solution["gamma_low"], solution["gamma_high"]
+        # The truth itself misses by 1 px at most.
+        self.assertTrue(0 < low <= high <= 1.01 / 700, (low, high))
+        self.assertAlmostEqual(solution["gap"], 1 - low / high, places=12)
+        self.assertLessEqual(solution["gap"], 0.0101)
+
+    def test_mathematics_that_says_no_is_no_error(self):
+        _, _, (cam_from_world, view, track, pixels, camera) = self.scene(0)
+        alone = view == 0
+        solution = rotslam.solve_known_rotation(
+            cam_from_world, view[alone], track[alone], pixels[alone], camera)
+        self.assertEqual(solution["status"], "infeasible")
+        self.assertTrue(np.isnan(solution["centers"]).all())
+        self.assertEqual(solution["points"].shape, (0, 3))
+
+    def test_wrong_arrays_are_refused(self):
+        _, _, (cam_from_world, view, track, pixels, camera) = self.scene(0)
+
+        def refusal(*arguments, **options):
+            with self.assertRaises(ValueError) as context:
+                rotslam.solve_known_rotation(*arguments, camera, **options)
+            return str(context.exception)
+
+        self.assertIn("cam_from_world must be an array of numbers [n, 3, 3], found float64 of "
+                      "shape (7, 9)", refusal(cam_from_world.reshape(7, 9), view, track, pixels))
+        self.assertIn("cam_from_world[0]: ", refusal(2 * cam_from_world, view, track, pixels))
+        self.assertIn("view must be", refusal(cam_from_world, view + 0.5, track, pixels))
+        self.assertIn("track has -7", refusal(cam_from_world, view, track - 10, pixels))
+        self.assertIn("track must be as long as view", refusal(cam_from_world, view, [1], pixels))
+        self.assertIn("keypoints_px must be", refusal(cam_from_world, view, track, pixels[1:]))
+        self.assertIn("keypoints_px must be", refusal(cam_from_world, view, track, pixels > 0))
+        self.assertIn("keypoints_px[0]", refusal(cam_from_world, view, track, pixels * np.nan))
+        self.assertIn("sigma_px must be",
+                      refusal(cam_from_world, view, track, pixels, sigma_px=[1]))
+        self.assertIn("sigma_rad must be",
+                      refusal(cam_from_world, view, track, pixels, sigma_rad=[1]))
+        self.assertTrue(refusal(cam_from_world, view + 1, track, pixels))
+
+
+if __name__ == "__main__":
+    unittest.main()
