@@ -10,12 +10,19 @@ endfunction()
 
 run(${CMAKE_COMMAND} --install ${build_dir} --prefix ${work_dir}/prefix)
 run(${CMAKE_COMMAND} -S ${consumer_dir} -B ${work_dir}/build -G ${generator}
-  -D CMAKE_PREFIX_PATH=${work_dir}/prefix -D CMAKE_CXX_COMPILER=${compiler} -D CMAKE_CXX_FLAGS=${flags})
+  -D CMAKE_PREFIX_PATH=${work_dir}/prefix -D CMAKE_CXX_COMPILER=${compiler} -D CMAKE_CXX_FLAGS=${flags}
+  -D expected_version=${version})
 run(${CMAKE_COMMAND} --build ${work_dir}/build)
 run(${work_dir}/build/consumer ${work_dir}/trajectory.txt)
 run(${work_dir}/prefix/bin/rotslam eval --json ${work_dir}/trajectory.txt ${work_dir}/trajectory.txt)
 # The vocabulary is in the program, wherever it lies.
 run(${work_dir}/prefix/bin/rotslam vocabulary info)
+
+# The Python module, where it was built.
+if(python)
+  run(${CMAKE_COMMAND} -E env PYTHONPATH=${work_dir}/prefix/${python_dir}
+    ${python} -c "import rotslam; assert rotslam.__version__ == '${version}', rotslam.__version__")
+endif()
 
 # The streaming example, on a few rendered images: eight numbers for each.
 run(${CMAKE_COMMAND} -S ${example_dir} -B ${work_dir}/streaming -G ${generator}
