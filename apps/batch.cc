@@ -223,13 +223,7 @@ void AddBatchCommand(CLI::App& app, Action& action) {
   const auto flags = std::make_shared<BatchFlags>();
   CLI::App* command = app.add_subcommand(
       "batch", "Many sequences, one table of results: runs what is not done yet");
-  command
-      ->add_option("list",
-                   flags->list,
-                   "YAML list of sequences: `- path: ..` with name, camera, ground_truth, times, "
-                   "command, rotations, vocabulary, config, options where wanted; paths count "
-                   "from the list's folder")
-      ->required();
+  command->add_option("list", flags->list, "YAML list of sequences, see below")->required();
   command->add_option("--out", flags->out, "Folder for the results, one folder in it per sequence")
       ->required();
   CLI::Option* jobs =
@@ -246,7 +240,21 @@ void AddBatchCommand(CLI::App& app, Action& action) {
   only->excludes(collect)->excludes(slurm);
   collect->excludes(slurm);
   AddCommonFlags(*command, flags->common);
-  command->footer("Example: rotslam batch kitti.yaml --jobs 4 --out runs/kitti");
+  command->footer(
+      "A list, of which only the first line must be there; paths count from its folder:\n"
+      "  - path: kitti/sequences/00          # folder or video, as `rotslam run` takes it\n"
+      "    name: kitti00                     # folder below --out; else the last part of path\n"
+      "    command: run                      # or rotations\n"
+      "    camera: calib.txt                 # else what lies with the images\n"
+      "    ground_truth: kitti/poses/00.txt  # else nothing to compare with\n"
+      "    times: kitti/00/times.txt         # timestamps of a KITTI ground truth\n"
+      "    rotations: gimbal.csv             # as --rotations of run\n"
+      "    vocabulary: ORBvoc.txt            # as --vocabulary\n"
+      "    config: kitti.yaml                # else --config\n"
+      "    options: {loop: {use_loops: false}, sequence: {stride: 2}}  # over those of config\n"
+      "Each sequence leaves batch.json (how it went) and log.txt beside its results; what is done\n"
+      "with the same options is skipped the next time, what failed is tried again.\n"
+      "Example: rotslam batch kitti.yaml --jobs 4 --out runs/kitti");
   command->callback([flags, jobs, &action] {
     flags->jobs_given = jobs->count() > 0;
     action = [flags] { return Batch(*flags); };

@@ -64,7 +64,8 @@ Children::Children() {
 }
 
 Children::~Children() {
-  while (num_running() > 0) Wait();
+  for (const auto& [pid, child] : running_) kill(pid, SIGTERM);
+  for (const auto& [pid, child] : running_) waitpid(pid, nullptr, 0);
   pthread_sigmask(SIG_SETMASK, &mask_before_, nullptr);
 }
 

@@ -26,7 +26,7 @@ struct ChildEnd {
 class Children {
  public:
   Children();
-  /// Waits for the children that still run.
+  /// Ends the children that still run.
   ~Children();
   Children(const Children&) = delete;
   Children& operator=(const Children&) = delete;

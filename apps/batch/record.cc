@@ -19,6 +19,7 @@ namespace fs = std::filesystem;
 using Json = nlohmann::ordered_json;
 
 constexpr const char* kRecordFile = "batch.json";
+constexpr const char* kReportFile = "report.html";
 
 // The place of a dotted key, made on the way where it does not exist.
 Json& At(Json& object, const std::string& key) {
@@ -175,6 +176,7 @@ BatchResult ResultOf(const BatchEntry& entry,
     if (result.note.empty()) result.note = "summary.json is missing or not whole";
     return result;
   }
+  if (fs::exists(directory / kReportFile)) result.report = entry.name + "/" + kReportFile;
   result.frames = Count(*summary, "frames");
   result.points = Count(*summary, "points");
   if (!entry.ground_truth.empty()) AddMetrics(entry, directory, num_threads, result);

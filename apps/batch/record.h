@@ -51,6 +51,7 @@ struct BatchResult {
   std::optional<double> cpu_s;
   std::string status;  // "done", "failed", "not run", "outdated": ran with another request
   std::string note;    // why it failed, or could not be compared
+  std::string report;  // page about the run, relative to --out; empty: there is none
 };
 
 /// Reads what a run has left in `directory` and compares it with the entry's ground truth.

@@ -57,7 +57,11 @@ std::string HtmlRow(const BatchResult& result) {
       result.coverage ? std::optional(100.0 * *result.coverage) : std::nullopt;
   std::string row =
       "<tr class=\"" + std::string(result.status == "done" ? "done" : "other") + "\">";
-  row += "<th scope=\"row\">" + HtmlText(result.name) + "</th>";
+  const std::string name = HtmlText(result.name);
+  row += "<th scope=\"row\">" +
+         (result.report.empty() ? name
+                                : "<a href=\"" + HtmlText(result.report) + "\">" + name + "</a>") +
+         "</th>";
   row += Cell(Shown(result.frames)) + Cell(Shown(percent, "%.1f"));
   row += Cell(Shown(result.rpe1_deg, "%.4f")) + Cell(Shown(result.rpen_deg, "%.4f"));
   row += Cell(Shown(result.ate, "%.4f")) + Cell(Shown(result.points));
@@ -87,6 +91,7 @@ th, td { padding: .3rem .8rem; text-align: right; white-space: nowrap; }
 thead th { border-bottom: 1px solid var(--ink); }
 tbody tr + tr > * { border-top: 1px solid var(--line); }
 tbody th { font-weight: 600; }
+a { color: inherit; }
 th:first-child, th:last-child, .status { text-align: left; }
 .status { white-space: normal; min-width: 8rem; }
 .other .status { color: var(--alert); }

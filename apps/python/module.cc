@@ -1,6 +1,7 @@
 // The Python module `rotslam`. Docstrings here are the manual; the algorithms' own are in the C++
 // headers named there.
 #include <algorithm>
+#include <atomic>
 #include <cstdint>
 #include <filesystem>
 #include <limits>
@@ -131,7 +132,13 @@ void OverrideGroup(const py::dict& given,
       found = true;
       std::visit([&, v = value](auto* field) { Assign(key, v, *field); }, option.field);
     }
-    if (!found) throw std::invalid_argument(UnknownOption(key, options));
+    if (found) continue;
+    const bool is_group = std::any_of(options.begin(), options.end(), [&](const OptionRef& option) {
+      return option.key.starts_with(key + ".");
+    });
+    throw std::invalid_argument(is_group ? "\"" + key + "\" is a group of options, found " +
+                                               std::string(py::repr(value))
+                                         : UnknownOption(key, options));
   }
 }
 
@@ -366,7 +373,7 @@ class PyOdometry {
   Camera camera_;
   RotationalOdometry odometry_;
   double last_timestamp_s_ = -std::numeric_limits<double>::infinity();
-  int num_frames_ = 0;
+  std::atomic<int> num_frames_ = 0;  // read while a call of another thread runs
 };
 
 // ---- solve_known_rotation
@@ -548,6 +555,9 @@ py::object EvaluateTrajectory(const py::object& ground_truth,
   options.max_gap_s = max_gap_s;
   options.num_threads = threads;
   if (const auto problem = options.Problem()) throw std::invalid_argument(*problem);
+  if (images < 0) {
+    throw std::invalid_argument("images is " + std::to_string(images) + ", must be 0 or more");
+  }
   std::optional<std::filesystem::path> times_file;
   if (!times.is_none()) times_file = PathOf(times);
   const NamedTrajectory truth = TrajectoryFrom("ground_truth", ground_truth, times_file);

@@ -14,7 +14,8 @@ import numpy as np
 import rotslam
 
 program = os.environ.get("ROTSLAM_EXECUTABLE", "build/release/apps/rotslam")
-folder = Path(tempfile.mkdtemp(prefix="rotslam-"))
+temporary = tempfile.TemporaryDirectory(prefix="rotslam-")
+folder = Path(temporary.name)
 subprocess.run(
     [program, "simulate", "handheld", "--frames=24", "--width=320", "--height=240", "--quiet",
      f"--out={folder}"],

@@ -83,6 +83,8 @@ class OnASequence(unittest.TestCase):
             rotslam.evaluate(truth, self.folder / "none.txt")
         with self.assertRaisesRegex(ValueError, r"estimate must be .* \[n, 8\].*\(24, 7\)"):
             rotslam.evaluate(truth, rows[:, :7])
+        with self.assertRaisesRegex(ValueError, "images is -1"):
+            rotslam.evaluate(truth, rows, images=-1)
         with self.assertRaisesRegex(ValueError, "timestamps must ascend"):
             rotslam.evaluate(truth, rows[::-1])
 
@@ -171,6 +173,7 @@ class OptionsAndCameras(unittest.TestCase):
                       self.refusal(options={"features": {"max_features": 1.5}}))
         self.assertIn("a whole number", self.refusal(options={"features": {"max_features": 10**30}}))
         self.assertIn("a whole number", self.refusal(options={"features": {"max_features": True}}))
+        self.assertIn('"averaging" is a group', self.refusal(options={"averaging": 3}))
         self.assertIn("must be a dict", self.refusal(options=[1]))
         self.assertIn("threads is 0", self.refusal(threads=0))
 
