@@ -7,6 +7,7 @@
 
 #include "output/metrics.h"
 #include "output/text_file.h"
+#include "rotodom/types/median.h"
 
 namespace rotslam {
 namespace {
@@ -15,13 +16,6 @@ namespace {
 constexpr double kMinDisagreementDeg = 0.5;
 // How many times better another reading must fit before it is believed.
 constexpr double kClearlyBetter = 5.0;
-
-double Median(std::vector<double> values) {
-  if (values.empty()) return 0.0;
-  const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
-  std::nth_element(values.begin(), middle, values.end());
-  return *middle;
-}
 
 double MedianOverEdges(const ViewGraph& graph,
                        const std::function<double(const RelativeRotation&)>& error) {

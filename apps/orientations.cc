@@ -8,6 +8,8 @@
 #include <stdexcept>
 #include <utility>
 
+#include "rotodom/types/median.h"
+
 namespace rotslam {
 
 void InterpolateUnconnected(const Orientations& orientations, RotationMap& rotations) {
@@ -57,19 +59,17 @@ void WarnOfTurnScale(const std::vector<LoopCheck>& loops, Progress& progress) {
   for (const LoopCheck& loop : loops) {
     if (loop.accepted && loop.way.turn_scale != 1.0) scales.push_back(loop.way.turn_scale);
   }
-  if (scales.empty()) return;
-  const auto middle = scales.begin() + static_cast<std::ptrdiff_t>(scales.size() / 2);
-  std::nth_element(scales.begin(), middle, scales.end());
-  if (std::abs(*middle - 1.0) < kNotable) return;
+  const double scale = Median(std::move(scales), 1.0);
+  if (std::abs(scale - 1.0) < kNotable) return;
   std::array<char, 160> text = {};
   std::snprintf(text.data(),
                 text.size(),
                 "turns around %zu closed loops come out %.1f %% too %s: check the focal length, "
                 "which seems too %s",
                 scales.size(),
-                100.0 * std::abs(*middle - 1.0),
-                *middle > 1.0 ? "small" : "large",
-                *middle > 1.0 ? "long" : "short");
+                100.0 * std::abs(scale - 1.0),
+                scale > 1.0 ? "small" : "large",
+                scale > 1.0 ? "long" : "short");
   progress.Warn(text.data());
 }
 

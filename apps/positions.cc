@@ -105,6 +105,14 @@ Similarity PlaceBehind(const Reconstruction& placed,
   return similarity;
 }
 
+std::map<FrameId, PoseCovariance> Moved(std::map<FrameId, PoseCovariance> covariances,
+                                        const Similarity& similarity) {
+  PoseCovariance J = PoseCovariance::Identity();
+  J.bottomRightCorner<3, 3>() = similarity.scale * similarity.turn.Matrix();
+  for (auto& [frame, covariance] : covariances) covariance = J * covariance * J.transpose();
+  return covariances;
+}
+
 void Append(Reconstruction& map, Reconstruction part) {
   map.cam_from_world.insert(part.cam_from_world.begin(), part.cam_from_world.end());
   map.center_in_world.insert(part.center_in_world.begin(), part.center_in_world.end());
@@ -286,13 +294,15 @@ PositionResult FindPositions(const Orientations& orientations,
     if (!bundle.Usable() || bundle.reconstruction.center_in_world.size() < 2) continue;
     if (!result.components.empty()) {
       component.placed_by_default = true;
-      bundle.reconstruction = Moved(bundle.reconstruction,
-                                    PlaceBehind(result.map,
-                                                bundle.reconstruction,
-                                                result.cam_from_world,
-                                                orientations.timestamps_s,
-                                                result.held));
+      const Similarity placed = PlaceBehind(result.map,
+                                            bundle.reconstruction,
+                                            result.cam_from_world,
+                                            orientations.timestamps_s,
+                                            result.held);
+      bundle.reconstruction = Moved(bundle.reconstruction, placed);
+      bundle.pose_covariance = Moved(std::move(bundle.pose_covariance), placed);
     }
+    result.pose_covariance.merge(bundle.pose_covariance);
     Append(result.map, std::move(bundle.reconstruction));
     result.bundles.push_back(std::move(bundle.summary));
     result.components.push_back(std::move(component));

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <map>
 #include <set>
 #include <string>
 #include <vector>
@@ -22,8 +23,9 @@ struct PositionResult {
   std::vector<HeldStretch> held;
   std::vector<MapComponent> components;  // by their first keyframe
   KrotSolution krot;
-  std::vector<BundleSummary> bundles;  // one per component
-  int num_cloud_outliers = 0;          // points that stood alone and left the cloud
+  std::map<FrameId, PoseCovariance> pose_covariance;  // of refined keyframes, where asked for
+  std::vector<BundleSummary> bundles;                 // one per component
+  int num_cloud_outliers = 0;                         // points that stood alone and left the cloud
   int num_resected = 0;
   int num_interpolated = 0;         // frames between keyframes whose position is interpolated
   bool is_held_throughout = false;  // the camera never changes its place: nothing to find

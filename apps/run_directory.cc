@@ -13,6 +13,7 @@
 #include "output/loops_csv.h"
 #include "output/map_keypoints.h"
 #include "output/ply.h"
+#include "output/pose_covariance_csv.h"
 #include "output/rotations_csv.h"
 #include "output/run_map.h"
 #include "output/segments.h"
@@ -176,6 +177,17 @@ void WritePositions(const std::filesystem::path& directory,
   }
   WriteFrustaPly(directory / "cameras.ply", frusta, camera, form);
   WriteSegments(directory / "segments.csv", segments);
+  const std::filesystem::path covariance_file = directory / "pose_covariance.csv";
+  if (positions.pose_covariance.empty()) {
+    std::filesystem::remove(covariance_file);  // of a run before, into the same folder
+    return;
+  }
+  std::vector<PoseCovarianceRow> rows;
+  rows.reserve(positions.pose_covariance.size());
+  for (const auto& [frame, covariance] : positions.pose_covariance) {
+    rows.push_back({frame.value, orientations.timestamps_s[frame.value], covariance});
+  }
+  WritePoseCovarianceCsv(covariance_file, rows);
 }
 
 void WriteKnownRotationInput(const std::filesystem::path& directory,
@@ -356,6 +368,17 @@ void AddBundles(const std::vector<BundleSummary>& bundles,
                             {"lens.fy", camera.fy},
                             {"lens.k1", camera.distortion[0]},
                             {"lens.k2", camera.distortion[1]}};
+  if (largest.lens_sigmas) {
+    const LensSigmas& sigmas = *largest.lens_sigmas;
+    summary.ba->insert(summary.ba->end(),
+                       {{"lens.cx", camera.cx},
+                        {"lens.cy", camera.cy},
+                        {"lens.sigma_focal_px", sigmas.focal_px},
+                        {"lens.sigma_cx_px", sigmas.cx_px},
+                        {"lens.sigma_cy_px", sigmas.cy_px},
+                        {"lens.sigma_k1", sigmas.k1},
+                        {"lens.sigma_k2", sigmas.k2}});
+  }
   double bundle_seconds = 0.0;
   std::map<std::string, std::int64_t> iterations_of;
   std::map<std::string, double> seconds_of;

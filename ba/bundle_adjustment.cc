@@ -8,6 +8,7 @@
 
 #include "ba/bundle_state.h"
 #include "ba/classification.h"
+#include "ba/lens.h"
 #include "ba/minimisation.h"
 #include "rotodom/types/triangulation.h"
 
@@ -129,10 +130,39 @@ class Rounds {
     if (!refine_lens_) state = before;
   }
 
+  // Of what the state holds now.
+  void FindCovariances(const BundleRound& round, BundleState& state) {
+    if (!options_.find_covariance && !refine_lens_) return;
+    const auto found = rotslam::FindCovariances(calibrated_, round, refine_lens_, options_, state);
+    if (!found) return;
+    if (options_.find_covariance) {
+      for (std::size_t k = 0; k < state.frames.size(); ++k) {
+        if (found->poses[k]) result_.pose_covariance[state.frames[k].id] = *found->poses[k];
+      }
+    }
+    if (found->lens) result_.summary.lens_sigmas = SigmasOf(*found->lens);
+  }
+
   bool good() const { return good_; }
   double max_error_px() const { return max_error_px_; }  // of the last round
 
  private:
+  LensSigmas SigmasOf(const Eigen::Matrix<double, 6, 6>& covariance) const {
+    const LensParameters sigma = covariance.diagonal().cwiseSqrt();
+    const LensOptions& lens = options_.lens;
+    LensSigmas sigmas;
+    if (lens.refine_focal) sigmas.focal_px = calibrated_.fx * sigma[0];
+    if (lens.refine_principal_point) {
+      sigmas.cx_px = calibrated_.fx * sigma[2];
+      sigmas.cy_px = calibrated_.fy * sigma[3];
+    }
+    if (lens.refine_distortion) {
+      sigmas.k1 = sigma[4];
+      sigmas.k2 = sigma[5];
+    }
+    return sigmas;
+  }
+
   void Minimise(const std::string& name,
                 const BundleRound& round,
                 std::chrono::steady_clock::time_point start,
@@ -261,6 +291,7 @@ BundleResult RefineBundle(const BundleProblem& problem, const BundleOptions& opt
   if (rounds.good()) {
     ClassifyAll(rounds.max_error_px(), /*retriangulate=*/false, options, state);
     summary.after = Statistics(state);
+    rounds.FindCovariances(options.fine, state);
     TakeResult(problem, state, result);
     result.message = summary.rounds.back().termination;
   } else {

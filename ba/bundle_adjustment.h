@@ -6,6 +6,8 @@
 #include <string>
 #include <vector>
 
+#include <Eigen/Core>
+
 #include "ba/bundle_options.h"
 #include "rotodom/camera/camera.h"
 #include "rotodom/types/reconstruction.h"
@@ -25,6 +27,19 @@ struct BundleProblem {
   /// Frames whose pose does not move: the older side of a window. When empty, the first frame is
   /// held and the scale stays.
   std::set<FrameId> fixed_frames;
+};
+
+/// Of (delta, centre): delta in rad as in Exp(delta) * cam_from_world, centre in world units.
+using PoseCovariance = Eigen::Matrix<double, 6, 6>;
+
+/// Standard deviations of a refined lens, the calibration's own counted in; zero for what was held.
+/// As pose_covariance, they count every observation's error as independent.
+struct LensSigmas {
+  double focal_px = 0.0;
+  double cx_px = 0.0;
+  double cy_px = 0.0;
+  double k1 = 0.0;
+  double k2 = 0.0;
 };
 
 enum class BundleStatus {
@@ -74,6 +89,7 @@ struct BundleSummary {
   int num_dropped_observations = 0;  // of the observations given, dropped tracks' included
   double lens_gain = 0.0;     // share of the cost that another lens took off, see LensOptions
   bool lens_refined = false;  // whether that was enough
+  std::optional<LensSigmas> lens_sigmas;  // where it was
   double seconds = 0.0;
   std::vector<BundleRoundSummary> rounds;
 };
@@ -90,6 +106,12 @@ struct BundleResult {
   /// Frames with a pose at the start but too few good observations to refine it; those that share
   /// the centre of a refined frame still have a pose.
   std::vector<FrameId> weak_frames;
+  /// With `options.find_covariance`, of the frames that see points: in the result's gauge (see
+  /// RefineBundle), so that they grow with the distance from the first frame. They count every
+  /// observation's error as independent and as large as its sigma_px says; neighbouring
+  /// observations err alike, so on real images they are too small. Zero for what was held. Empty
+  /// where the observations leave a camera open.
+  std::map<FrameId, PoseCovariance> pose_covariance;
   BundleSummary summary;
   /// Whether `reconstruction` may be used in place of the start.
   [[nodiscard]] bool Usable() const {

@@ -100,6 +100,8 @@ struct BundleOptions {
   // false holds the rotations in every round: they come out bit by bit as they went in.
   bool refine_rotations = true;
   LensOptions lens;
+  // Whether the result says how well each pose is known.
+  bool find_covariance = false;
 
   // A track with fewer fitting observations is dropped. Two views always agree along the epipolar
   // line, so two say nothing about the match; three do.
@@ -133,6 +135,7 @@ struct BundleOptions {
     visit("max_changed_share", max_changed_share);
     visit("refine_rotations", refine_rotations);
     visit("lens", lens);
+    visit("find_covariance", find_covariance);
     visit("min_observations", min_observations);
     visit("min_angle_deg", min_angle_deg);
     visit("min_frame_observations", min_frame_observations);

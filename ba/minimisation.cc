@@ -8,8 +8,10 @@
 #include <ceres/loss_function.h>
 #include <ceres/ordered_groups.h>
 #include <ceres/problem.h>
+#include <ceres/sphere_manifold.h>
 
 #include "ba/lens.h"
+#include "ba/marginal_covariance.h"
 #include "ba/pose_manifold.h"
 #include "ba/reprojection_cost.h"
 
@@ -132,6 +134,40 @@ class Minimisation {
     return summary;
   }
 
+  // The problem may not be solved any more afterwards.
+  std::optional<CameraCovariances> Covariances() {
+    std::vector<double*> points;
+    for (TrackState& track : state_.tracks) {
+      if (!problem_.HasParameterBlock(track.position.data())) continue;
+      points.push_back(track.position.data());
+      // A direction's length means nothing.
+      if (track.kind == TrackKind::kDirection) problem_.SetManifold(points.back(), &directions_);
+    }
+    std::vector<double*> moving;
+    for (std::size_t k = 0; k < state_.frames.size(); ++k) {
+      if (Moves(cameras_.Quaternion(k))) moving.push_back(cameras_.Quaternion(k));
+    }
+    for (std::size_t c = 0; c < state_.centers.size() && !cameras_.joint(); ++c) {
+      if (Moves(cameras_.Center(c))) moving.push_back(cameras_.Center(c));
+    }
+    std::vector<std::vector<double*>> groups;
+    groups.reserve(state_.frames.size() + 1);
+    for (std::size_t k = 0; k < state_.frames.size(); ++k) groups.push_back(MovingBlocks(k));
+    if (refine_lens_) {
+      moving.push_back(lens_.data());
+      groups.push_back({lens_.data()});
+    }
+    const auto found = MarginalCovariances(problem_, points, moving, groups);
+    if (!found) return std::nullopt;
+    CameraCovariances covariances;
+    covariances.poses.resize(state_.frames.size());
+    for (std::size_t k = 0; k < state_.frames.size(); ++k) {
+      if (frame_used_[k]) covariances.poses[k] = OfPose((*found)[k], k);
+    }
+    if (refine_lens_) covariances.lens = found->back();
+    return covariances;
+  }
+
  private:
   static ceres::Problem::Options ProblemOptions() {
     ceres::Problem::Options options;
@@ -140,6 +176,29 @@ class Minimisation {
     options.manifold_ownership = ceres::DO_NOT_TAKE_OWNERSHIP;
     options.disable_all_safety_checks = true;
     return options;
+  }
+
+  bool Moves(const double* block) const {
+    return problem_.HasParameterBlock(block) && !problem_.IsParameterBlockConstant(block);
+  }
+
+  // The blocks that a frame's pose is made of, as far as they move.
+  std::vector<double*> MovingBlocks(std::size_t frame) {
+    std::vector<double*> blocks;
+    if (Moves(cameras_.Quaternion(frame))) blocks.push_back(cameras_.Quaternion(frame));
+    if (cameras_.joint()) return blocks;
+    double* const center = cameras_.Center(state_.frames[frame].center);
+    if (Moves(center)) blocks.push_back(center);
+    return blocks;
+  }
+
+  // Zero for what is held. Only rotations alone leave the lower half zero.
+  PoseCovariance OfPose(const Eigen::MatrixXd& moving, std::size_t frame) {
+    PoseCovariance covariance = PoseCovariance::Zero();
+    const bool has_rotation = refine_rotations_ && Moves(cameras_.Quaternion(frame));
+    const Eigen::Index first = has_rotation ? 0 : 3;
+    covariance.block(first, first, moving.rows(), moving.cols()) = moving;
+    return covariance;
   }
 
   void AddResiduals() {
@@ -281,6 +340,7 @@ class Minimisation {
   LeftRotationManifold rotation_manifold_;
   PoseManifold pose_manifold_;
   CenterManifold center_manifold_;
+  ceres::SphereManifold<3> directions_;
   std::deque<ReprojectionCost> costs_;
   std::unique_ptr<LensPriorCost> lens_prior_;
   std::unique_ptr<ScaleAnchorCost> anchor_;
@@ -307,6 +367,16 @@ std::optional<MinimisationResult> Minimise(const Camera& calibrated,
   result.counts = minimisation.Counts();
   result.solver = minimisation.Solve(round, options);
   return result;
+}
+
+std::optional<CameraCovariances> FindCovariances(const Camera& calibrated,
+                                                 const BundleRound& round,
+                                                 bool refine_lens,
+                                                 const BundleOptions& options,
+                                                 BundleState& state) {
+  Minimisation minimisation(calibrated, round, refine_lens, options, state);
+  if (minimisation.Empty()) return std::nullopt;
+  return minimisation.Covariances();
 }
 
 }  // namespace rotslam

@@ -3,10 +3,12 @@
 #include <algorithm>
 #include <cmath>
 #include <stdexcept>
+#include <utility>
 
 #include <Eigen/Dense>
 
 #include "ba/reprojection_cost.h"
+#include "rotodom/types/median.h"
 #include "rotodom/types/options.h"
 
 namespace rotslam {
@@ -63,8 +65,7 @@ class Resection {
   double MedianSigmas(const Pose& pose) const {
     std::vector<double> sigmas;
     for (const PointSighting& sighting : sightings_) sigmas.push_back(Sigmas(pose, sighting));
-    std::nth_element(sigmas.begin(), sigmas.begin() + sigmas.size() / 2, sigmas.end());
-    return sigmas[sigmas.size() / 2];
+    return Median(std::move(sigmas));
   }
 
   bool IsInlier(const Pose& pose, const PointSighting& sighting) const {

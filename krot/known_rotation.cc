@@ -14,17 +14,10 @@
 #include "krot/minimax_problem.h"
 #include "krot/named_problem.h"
 #include "krot/track_points.h"
+#include "rotodom/types/median.h"
 
 namespace rotslam {
 namespace {
-
-// The linear programs have one bound for all: that of the median track.
-double MedianOf(std::vector<double> values, double if_none) {
-  if (values.empty()) return if_none;
-  const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
-  std::nth_element(values.begin(), middle, values.end());
-  return *middle;
-}
 
 KrotUnits WithThreshold(KrotUnits units, double gamma, const KrotOptions& options) {
   units.gamma = gamma;
@@ -185,12 +178,8 @@ void Normalise(CenterMap& centers, const std::vector<Track>& tracks, Triangulate
       }
     }
   }
-  double scale = 1.0;
-  if (!depths.empty()) {
-    const auto middle = depths.begin() + static_cast<std::ptrdiff_t>(depths.size() / 2);
-    std::nth_element(depths.begin(), middle, depths.end());
-    if (*middle > 0.0 && std::isfinite(*middle)) scale = 1.0 / *middle;
-  }
+  const double median = Median(std::move(depths));
+  const double scale = median > 0.0 && std::isfinite(median) ? 1.0 / median : 1.0;
   const Eigen::Vector3d origin = centers.begin()->second;
   for (auto& [frame, center] : centers) center = scale * (center - origin);
   for (auto& point : points) {
@@ -277,7 +266,8 @@ void Solve(const RotationMap& cam_from_world,
            KrotSolution& solution) {
   std::vector<Track> tracks = CleanTracks(input, solution.removed);
   const std::vector<double> thresholds = TrackThresholds(tracks, sigma_rad, options, units);
-  units = WithThreshold(units, MedianOf(thresholds, units.gamma), options);
+  // The linear programs have one bound for all: that of the median track.
+  units = WithThreshold(units, Median(thresholds, units.gamma), options);
   std::set<FrameId> views;
   int num_usable = 0;
   int num_moving = 0;

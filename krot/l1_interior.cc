@@ -8,6 +8,7 @@
 #include <Eigen/Geometry>
 
 #include "krot/half_spaces.h"
+#include "krot/recentring.h"
 #include "rotodom/types/stopwatch.h"
 
 namespace rotslam {
@@ -163,12 +164,6 @@ class NewtonSystem {
   bool usable_ = false;
 };
 
-// How far a step can go without leaving the positive orthant.
-struct Reach {
-  double primal;
-  double dual;
-};
-
 Reach ReachOf(const Iterate& at, const Step& step) {
   return {std::min(StepToBoundary(at.r, step.r), StepToBoundary(at.s, step.s)),
           std::min(StepToBoundary(at.y, step.y), StepToBoundary(at.z, step.z))};
@@ -198,17 +193,9 @@ bool Finite(const Step& step) {
   return std::all_of(step.y.begin(), step.y.end(), [](const Five& y) { return y.allFinite(); });
 }
 
-// What moves one row's product, after a step somewhat longer than can be made, towards `mu`.
-Five Recentred(const Five& product, double mu) {
-  constexpr double kLow = 0.1;
-  constexpr double kHigh = 10.0;
-  return (product.max(kLow * mu).min(kHigh * mu) - product).max(-kHigh * mu);
-}
-
-Products Recentring(const Iterate& at, const Step& step, const Reach& reach, double mu) {
-  constexpr double kFurther = 0.3;
-  const double primal = std::min(1.0, reach.primal + kFurther);
-  const double dual = std::min(1.0, reach.dual + kFurther);
+// What moves the products after a step of that length back towards `mu`.
+Products Recentring(const Iterate& at, const Step& step, const Reach& length, double mu) {
+  const auto [primal, dual] = length;
   Products change{Fives(at.r.size()), Fives(at.r.size())};
   for (std::size_t o = 0; o < at.r.size(); ++o) {
     change.yr[o] = Recentred((at.r[o] + primal * step.r[o]) * (at.y[o] + dual * step.y[o]), mu);
@@ -230,7 +217,6 @@ void AddTo(const Step& other, Step& step) {
 // Mehrotra's centring and correction, then Gondzio's recentring while it lengthens the step.
 bool NewtonStep(const Program& program, StructureSystem& system, Iterate& at) {
   constexpr int kMaxRecentrings = 4;
-  constexpr double kWorthwhile = 0.05;
   // Mehrotra's 3 is for steps that nothing lengthens: half as many steps again on a street.
   constexpr double kGreed = 12.0;
   const NewtonSystem newton(program, at, system);
@@ -258,20 +244,19 @@ bool NewtonStep(const Program& program, StructureSystem& system, Iterate& at) {
     change.yr[o] += target - trust * predictor.y[o] * predictor.r[o];
     change.zs[o] += target - trust * predictor.z[o] * predictor.s[o];
   }
-  Step step = newton.Solve(change, true);
+  Step corrected = newton.Solve(change, true);
+  if (!Finite(corrected)) return false;
+  const auto [step, reach] = Lengthened(
+      std::move(corrected),
+      kMaxRecentrings,
+      [&](const Step& any) { return ReachOf(at, any); },
+      [&](const Step& from, const Reach& aim) {
+        Step trial = newton.Solve(Recentring(at, from, aim, target), false);
+        AddTo(from, trial);
+        return trial;
+      });
   if (!Finite(step)) return false;
-  Reach reach = ReachOf(at, step);
-  for (int k = 0; k < kMaxRecentrings && std::min(reach.primal, reach.dual) < 0.9; ++k) {
-    Step trial = newton.Solve(Recentring(at, step, reach, target), false);
-    AddTo(step, trial);
-    const Reach further = ReachOf(at, trial);
-    if (!(further.primal + further.dual >= reach.primal + reach.dual + kWorthwhile)) break;
-    step = std::move(trial);
-    reach = further;
-  }
-  if (!Finite(step)) return false;
-  constexpr double kShortOf = 0.99;
-  Advance(program, step, kShortOf * reach.primal, kShortOf * reach.dual, at);
+  Advance(program, step, kShareOfReach * reach.primal, kShareOfReach * reach.dual, at);
   return true;
 }
 

@@ -3,11 +3,14 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <utility>
 
 #include <Eigen/Dense>
 
 #include "krot/half_spaces.h"
 #include "krot/lp.h"
+#include "krot/recentring.h"
+#include "rotodom/types/median.h"
 
 namespace rotslam {
 namespace {
@@ -234,27 +237,16 @@ void Advance(const Program& program, const Step& step, double primal, double dua
   }
 }
 
-// How far a step can go without leaving the positive orthant.
-struct Reach {
-  double primal;
-  double dual;
-};
-
 Reach ReachOf(const Iterate& at, const Step& step) {
   return {StepToBoundary(at.r, step.r), StepToBoundary(at.y, step.y)};
 }
 
-// What moves the products after a step somewhat longer than `reach` back towards `mu`.
-Fives Recentring(const Iterate& at, const Step& step, const Reach& reach, double mu) {
-  constexpr double kFurther = 0.3;
-  constexpr double kLow = 0.1;
-  constexpr double kHigh = 10.0;
-  const double primal = std::min(1.0, reach.primal + kFurther);
-  const double dual = std::min(1.0, reach.dual + kFurther);
+// What moves the products after a step of that length back towards `mu`.
+Fives Recentring(const Iterate& at, const Step& step, const Reach& length, double mu) {
   Fives change(at.r.size());
   for (std::size_t o = 0; o < at.r.size(); ++o) {
-    const Five product = (at.r[o] + primal * step.r[o]) * (at.y[o] + dual * step.y[o]);
-    change[o] = (product.max(kLow * mu).min(kHigh * mu) - product).max(-kHigh * mu);
+    change[o] =
+        Recentred((at.r[o] + length.primal * step.r[o]) * (at.y[o] + length.dual * step.y[o]), mu);
   }
   return change;
 }
@@ -292,7 +284,6 @@ struct Accuracy {
 // Mehrotra's centring and correction, then Gondzio's recentring while it lengthens the step.
 bool NewtonStep(const Program& program, StructureSystem& system, Iterate& at, Accuracy& accuracy) {
   constexpr int kMaxRecentrings = 2;
-  constexpr double kWorthwhile = 0.05;
   const NewtonSystem newton(program, at, system, accuracy.refine);
   if (!newton.usable()) return false;
   const double gap = Complementarity(at);
@@ -313,21 +304,20 @@ bool NewtonStep(const Program& program, StructureSystem& system, Iterate& at, Ac
   for (int o = 0; o < program.size(); ++o) {
     change[o] += target - trust * predictor.y[o] * predictor.r[o];
   }
-  Step step = newton.Solve(change, true);
+  Step corrected = newton.Solve(change, true);
+  if (!Finite(corrected)) return false;
+  const auto [step, reach] = Lengthened(
+      std::move(corrected),
+      kMaxRecentrings,
+      [&](const Step& any) { return ReachOf(at, any); },
+      [&](const Step& from, const Reach& aim) {
+        Step trial = newton.Solve(Recentring(at, from, aim, target), false);
+        AddTo(from, trial);
+        return trial;
+      });
   if (!Finite(step)) return false;
-  Reach reach = ReachOf(at, step);
-  for (int k = 0; k < kMaxRecentrings && std::min(reach.primal, reach.dual) < 0.9; ++k) {
-    Step trial = newton.Solve(Recentring(at, step, reach, target), false);
-    AddTo(step, trial);
-    const Reach further = ReachOf(at, trial);
-    if (!(further.primal + further.dual >= reach.primal + reach.dual + kWorthwhile)) break;
-    step = std::move(trial);
-    reach = further;
-  }
-  if (!Finite(step)) return false;
-  constexpr double kShortOf = 0.99;
-  accuracy.expected = (1.0 - kShortOf * reach.dual) * accuracy.dual_error;
-  Advance(program, step, kShortOf * reach.primal, kShortOf * reach.dual, at);
+  accuracy.expected = (1.0 - kShareOfReach * reach.dual) * accuracy.dual_error;
+  Advance(program, step, kShareOfReach * reach.primal, kShareOfReach * reach.dual, at);
   return true;
 }
 
@@ -346,13 +336,6 @@ double DualObjective(const Program& program, const Iterate& at) {
   double objective = at.nu;
   for (int o = 0; o < program.size(); ++o) objective -= program.DepthBound(o) * at.y[o][4];
   return objective;
-}
-
-double Median(std::vector<double> values) {
-  if (values.empty()) return 0.0;
-  const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
-  std::nth_element(values.begin(), middle, values.end());
-  return *middle;
 }
 
 // Depths of points that `reference` misses by far are no guide: centres a little wrong can bring

@@ -31,8 +31,8 @@ class CameraSystem;
 /// Linear systems with the structure of bundle adjustment; what the problem holds fixed has its
 /// place in the vectors, and zero in the solutions. H is the sum over the observations of (X - c)
 /// -> S (X - c) with 3 x 3 positive semidefinite S. Points are eliminated one by one; the system of
-/// the centres is factored by tiles, of which only those that fill in exist. Cost:    sum of
-/// squared track lengths to assemble; the centres' factor is linear in the views
+/// the centres is factored by tiles, of which only those that fill in exist.
+/// Cost:    sum of squared track lengths to assemble; the centres' factor is linear in the views
 ///          for a drive, cubic where every two views share points.
 class StructureSystem {
  public:

@@ -221,6 +221,7 @@ KrotSolution ExtendKnownRotation(const KrotSolution& known,
   solution.removed.clear();
   solution.active.clear();
   solution.num_programs = solution.num_grown_views = 0;
+  solution.num_bracket_observations = solution.num_bracket_tracks = 0;
   std::vector<RemovedObservation> removed;
   const std::vector<Track> clean = CleanTracks(input, removed);
   const KnownPart part = TakeKnown(known, clean);

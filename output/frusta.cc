@@ -1,13 +1,14 @@
-#include <algorithm>
 #include <array>
 #include <cmath>
 #include <stdexcept>
 #include <string>
+#include <utility>
 
 #include "output/atomic_file.h"
 #include "output/binary_file.h"
 #include "output/ply.h"
 #include "output/text_file.h"
+#include "rotodom/types/median.h"
 
 namespace rotslam {
 namespace {
@@ -96,10 +97,7 @@ double FrustumSize(const CenterMap& centers) {
     if (step > 0.0) steps.push_back(step);
     before = &center;
   }
-  if (steps.empty()) return 1.0;
-  const auto middle = steps.begin() + static_cast<std::ptrdiff_t>(steps.size() / 2);
-  std::nth_element(steps.begin(), middle, steps.end());
-  return 0.5 * *middle;
+  return 0.5 * Median(std::move(steps), 2.0);
 }
 
 void WriteFrustaPly(const std::filesystem::path& path,

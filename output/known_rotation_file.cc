@@ -11,6 +11,7 @@
 #include "output/atomic_file.h"
 #include "output/colmap_model.h"
 #include "output/text_file.h"
+#include "rotodom/types/median.h"
 
 namespace rotslam {
 namespace {
@@ -192,12 +193,6 @@ struct BalObservation {
   int point = 0;
   Eigen::Vector2d xy;  // pixels from the principal point, y up
 };
-
-double Median(std::vector<double> values) {
-  const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
-  std::nth_element(values.begin(), middle, values.end());
-  return *middle;
-}
 
 // One camera of the file: turned to our axes, and with its lens.
 std::pair<Rotation, Camera> ReadBalCamera(RowReader& reader, const auto& number) {

@@ -3,6 +3,7 @@
 #include <nlohmann/json.hpp>
 
 #include "output/atomic_file.h"
+#include "output/distortion_json.h"
 
 namespace rotslam {
 namespace {
@@ -11,7 +12,6 @@ using Json = nlohmann::ordered_json;
 
 Json CameraToJson(const Camera& camera) {
   const bool is_fisheye = camera.model == CameraModel::kEquidistant;
-  const auto& d = camera.distortion;
   Json json = {{"camera_model", is_fisheye ? "OPENCV_FISHEYE" : "OPENCV"},
                {"is_fisheye", is_fisheye},
                {"w", camera.width},
@@ -19,17 +19,8 @@ Json CameraToJson(const Camera& camera) {
                {"fl_x", camera.fx},
                {"fl_y", camera.fy},
                {"cx", camera.cx + 0.5},
-               {"cy", camera.cy + 0.5},
-               {"k1", d[0]},
-               {"k2", d[1]}};
-  if (is_fisheye) {
-    json["k3"] = d[2];
-    json["k4"] = d[3];
-  } else {
-    json["p1"] = d[2];
-    json["p2"] = d[3];
-    json["k3"] = d[4];
-  }
+               {"cy", camera.cy + 0.5}};
+  AddDistortion(camera, json);
   return json;
 }
 

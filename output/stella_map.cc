@@ -12,6 +12,7 @@
 #include <nlohmann/json.hpp>
 
 #include "output/atomic_file.h"
+#include "output/distortion_json.h"
 #include "output/map_keypoints.h"
 
 namespace rotslam {
@@ -34,7 +35,6 @@ double FramesPerSecond(const RunMap& map) {
 
 Json CameraToJson(const RunMap& map) {
   const Camera& camera = map.camera;
-  const auto& d = camera.distortion;
   const bool is_fisheye = camera.model == CameraModel::kEquidistant;
   Json json = {{"model_type", is_fisheye ? "Fisheye" : "Perspective"},
                {"setup_type", "Monocular"},
@@ -48,17 +48,8 @@ Json CameraToJson(const RunMap& map) {
                {"fx", camera.fx},
                {"fy", camera.fy},
                {"cx", camera.cx},
-               {"cy", camera.cy},
-               {"k1", d[0]},
-               {"k2", d[1]}};
-  if (is_fisheye) {
-    json["k3"] = d[2];
-    json["k4"] = d[3];
-  } else {
-    json["p1"] = d[2];
-    json["p2"] = d[3];
-    json["k3"] = d[4];
-  }
+               {"cy", camera.cy}};
+  AddDistortion(camera, json);
   return json;
 }
 

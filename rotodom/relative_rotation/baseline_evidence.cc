@@ -3,10 +3,12 @@
 #include <algorithm>
 #include <cmath>
 #include <stdexcept>
+#include <utility>
 #include <vector>
 
 #include <Eigen/Dense>
 
+#include "rotodom/types/median.h"
 #include "rotodom/types/options.h"
 
 namespace rotslam {
@@ -78,9 +80,7 @@ double VarianceAcross(const std::vector<WhitenedErrors>& errors) {
   std::vector<double> squares;
   squares.reserve(errors.size());
   for (const WhitenedErrors& error : errors) squares.push_back(error.epipolar);
-  const auto middle = squares.begin() + static_cast<std::ptrdiff_t>(squares.size() / 2);
-  std::nth_element(squares.begin(), middle, squares.end());
-  return kFromMedian * *middle;
+  return kFromMedian * Median(std::move(squares));
 }
 
 // The most that the errors of one view pair show in any direction, in standard deviations: with

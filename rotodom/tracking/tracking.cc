@@ -8,6 +8,7 @@
 
 #include "rotodom/relative_rotation/normal_epipolar.h"
 #include "rotodom/tracking/patch_alignment.h"
+#include "rotodom/types/median.h"
 #include "rotodom/types/options.h"
 #include "rotodom/types/parallel.h"
 
@@ -267,12 +268,10 @@ std::optional<Rotation> AlignMostBearings(const std::vector<BearingPair>& pairs)
     for (const BearingPair& pair : pairs) {
       errors.push_back((*aligned * pair.bearing_i - pair.bearing_j).norm());
     }
-    std::vector<double> sorted = errors;
-    const auto middle = sorted.begin() + static_cast<std::ptrdiff_t>(sorted.size() / 2);
-    std::nth_element(sorted.begin(), middle, sorted.end());
+    const double median = Median(errors);
     kept.clear();
     for (std::size_t k = 0; k < pairs.size(); ++k) {
-      if (errors[k] <= 1.5 * *middle) kept.push_back(pairs[k]);
+      if (errors[k] <= 1.5 * median) kept.push_back(pairs[k]);
     }
   }
   return j_from_i;

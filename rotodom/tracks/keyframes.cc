@@ -4,7 +4,9 @@
 #include <cmath>
 #include <map>
 #include <stdexcept>
+#include <utility>
 
+#include "rotodom/types/median.h"
 #include "rotodom/types/options.h"
 
 namespace rotslam {
@@ -45,9 +47,8 @@ Overlap Compare(const std::vector<Ray>& keyframe, const std::vector<Ray>& frame)
     angles.push_back(std::atan2(sine, ray.direction.dot(other->direction)));
   }
   if (angles.empty()) return {};
-  const auto middle = angles.begin() + static_cast<std::ptrdiff_t>(angles.size() / 2);
-  std::nth_element(angles.begin(), middle, angles.end());
-  return {static_cast<double>(angles.size()) / static_cast<double>(keyframe.size()), *middle};
+  const double overlap = static_cast<double>(angles.size()) / static_cast<double>(keyframe.size());
+  return {overlap, Median(std::move(angles))};
 }
 
 }  // namespace

@@ -298,6 +298,31 @@ TEST(RefineBundle, RefinesAFocalLengthWhenAsked) {
   EXPECT_EQ(result.camera.model, CameraModel::kPinhole);
 }
 
+TEST(RefineBundle, RefinesAPrincipalPointWhenAsked) {
+  Camera lens = BaCamera();
+  lens.cx += 8.0;
+  lens.cy -= 5.0;
+  BaScene scene =
+      MakeBaScene({.num_frames = 40, .num_points = 1500, .noise_px = 0.2, .camera = lens});
+  scene.camera = BaCamera();
+  BundleOptions options;
+  options.lens.refine_principal_point = true;
+  options.lens.refine_distortion = false;
+  options.lens.principal_sigma = 0.05;
+  options.lens.min_gain = 0.0;
+  options.coarse.function_tolerance = 1e-8;
+  const BundleResult result = RefineBundle(PerturbedProblem(scene, 0.1, 0.5), options);
+  ASSERT_TRUE(result.Usable());
+  ASSERT_TRUE(result.summary.lens_sigmas.has_value());
+  // Keypoints are five times as good as their sigma says.
+  EXPECT_NEAR(result.camera.cx, lens.cx, 0.6 * result.summary.lens_sigmas->cx_px);
+  EXPECT_NEAR(result.camera.cy, lens.cy, 0.6 * result.summary.lens_sigmas->cy_px);
+  EXPECT_NEAR(result.camera.cx, lens.cx, 2.0);
+  EXPECT_NEAR(result.camera.cy, lens.cy, 2.0);
+  EXPECT_EQ(result.camera.fx, lens.fx);
+  EXPECT_EQ(result.camera.model, CameraModel::kPinhole);
+}
+
 TEST(RefineBundle, LeavesAGoodCalibrationToTheLastBit) {
   for (const std::uint32_t seed : {1U, 2U, 3U}) {
     const BaScene scene = MakeBaScene({.noise_px = 0.5, .seed = seed});
@@ -306,6 +331,83 @@ TEST(RefineBundle, LeavesAGoodCalibrationToTheLastBit) {
     EXPECT_FALSE(result.summary.lens_refined) << result.summary.lens_gain;
     EXPECT_EQ(result.camera, scene.camera);
   }
+}
+
+// Squared errors in units of the stated covariance, per degree of freedom, over many noises.
+double NormalisedErrors(const BaSceneOptions& street, const BundleOptions& options) {
+  double sum = 0.0;
+  int count = 0;
+  BaSceneOptions noisy = street;
+  for (noisy.seed = 1; noisy.seed <= 8; ++noisy.seed) {
+    const BaScene scene = MakeBaScene(noisy);
+    // From the truth: the gauge is the truth's.
+    const BundleResult result = RefineBundle(PerturbedProblem(scene, 0.0, 0.0), options);
+    for (const auto& [frame, covariance] : result.pose_covariance) {
+      if (covariance.topLeftCorner<3, 3>().isZero()) continue;
+      Eigen::Matrix<double, 6, 1> error;
+      error << (result.reconstruction.cam_from_world.at(frame) *
+                scene.truth.cam_from_world.at(frame).Inverse())
+                   .Log(),
+          result.reconstruction.center_in_world.at(frame) - scene.truth.center_in_world.at(frame);
+      // The farthest centre's distance is held.
+      sum += error.dot((covariance + 1e-14 * PoseCovariance::Identity()).ldlt().solve(error));
+      count += 6;
+    }
+  }
+  return sum / count;
+}
+
+TEST(RefineBundle, StatesTheErrorsThatNoiseMakes) {
+  BundleOptions options = ExactOptions();
+  options.find_covariance = true;
+  options.lens.refine_distortion = false;
+  const BaSceneOptions street = {.num_frames = 12, .num_points = 200, .noise_px = 1.0};
+  EXPECT_NEAR(NormalisedErrors(street, options), 1.0, 0.35);
+  BaSceneOptions turning = street;
+  turning.still_first = 4;
+  turning.still_last = 7;
+  EXPECT_NEAR(NormalisedErrors(turning, options), 1.0, 0.35);
+}
+
+TEST(RefineBundle, HoldsWhatItStatesNoErrorOf) {
+  const BaScene scene = MakeBaScene({.noise_px = 0.5});
+  BundleOptions options = ExactOptions();
+  options.find_covariance = true;
+  options.refine_rotations = false;
+  const BundleResult result = RefineBundle(PerturbedProblem(scene, 0.0, 0.3), options);
+  ASSERT_EQ(result.pose_covariance.size(), scene.truth.center_in_world.size());
+  EXPECT_TRUE(result.pose_covariance.at(FrameId{0}).isZero());
+  const PoseCovariance& covariance = result.pose_covariance.at(FrameId{10});
+  EXPECT_TRUE(covariance.topRows(3).isZero());
+  EXPECT_FALSE(covariance.bottomRightCorner(3, 3).isZero());
+  EXPECT_TRUE(
+      RefineBundle(PerturbedProblem(scene, 0.0, 0.3), ExactOptions()).pose_covariance.empty());
+}
+
+TEST(RefineBundle, StatesHowWellTheLensIsKnown) {
+  Camera lens = BaCamera();
+  lens.fx *= 1.02;
+  lens.fy *= 1.02;
+  BundleOptions options;
+  options.lens.refine_focal = true;
+  options.lens.refine_distortion = false;
+  options.lens.focal_sigma = 1.0;  // the images alone decide
+  options.lens.min_gain = 0.0;
+  options.fine.function_tolerance = options.coarse.function_tolerance = 1e-9;
+  double sum = 0.0;
+  constexpr int kSeeds = 6;
+  for (std::uint32_t seed = 1; seed <= kSeeds; ++seed) {
+    BaScene scene = MakeBaScene({.noise_px = 1.0, .seed = seed, .camera = lens});
+    scene.camera = BaCamera();
+    const BundleResult result = RefineBundle(PerturbedProblem(scene, 0.0, 0.0), options);
+    ASSERT_TRUE(result.summary.lens_sigmas.has_value());
+    EXPECT_EQ(result.summary.lens_sigmas->k1, 0.0);
+    const double error = (result.camera.fx - lens.fx) / result.summary.lens_sigmas->focal_px;
+    sum += error * error;
+  }
+  // The mean of six squared normal variables lies in this with a probability of 0.998.
+  EXPECT_GT(sum / kSeeds, 0.06);
+  EXPECT_LT(sum / kSeeds, 3.8);
 }
 
 TEST(RefineBundle, SaysSoWhenThereIsTooLittle) {

@@ -15,6 +15,7 @@ Eigen::Matrix3d RandomPositive(SceneRandom& random) {
   return root * root.transpose();
 }
 
+// H where everything moves; what is held has the identity, and nothing in common with the rest.
 Eigen::MatrixXd Dense(const MinimaxProblem& problem, const std::vector<Eigen::Matrix3d>& S) {
   const StructureLayout layout{problem.num_views(), problem.num_points};
   Eigen::MatrixXd H = Eigen::MatrixXd::Zero(layout.size(), layout.size());
@@ -26,6 +27,17 @@ Eigen::MatrixXd Dense(const MinimaxProblem& problem, const std::vector<Eigen::Ma
     H.block<3, 3>(center, center) += S[o];
     H.block<3, 3>(center, point) -= S[o];
     H.block<3, 3>(point, center) -= S[o];
+  }
+  const auto hold = [&](int first) {
+    H.middleRows<3>(first).setZero();
+    H.middleCols<3>(first).setZero();
+    H.block<3, 3>(first, first).setIdentity();
+  };
+  for (int view = 1; view < problem.num_views(); ++view) {
+    if (problem.ViewFixed(view)) hold(layout.Center(view));
+  }
+  for (int point = 0; point < problem.num_points; ++point) {
+    if (problem.PointFixed(point)) hold(layout.Point(point));
   }
   return H;
 }
@@ -39,8 +51,16 @@ void ExpectSameAsDense(const MinimaxProblem& problem) {
   const Eigen::MatrixXd H = Dense(problem, S);
   Eigen::VectorXd b(H.rows());
   for (double& entry : b) entry = random.Normal(1.0);
+  const StructureLayout layout{problem.num_views(), problem.num_points};
+  Eigen::VectorXd pushed = b;  // also what is held, which must not move for it
+  for (int view = 1; view < problem.num_views(); ++view) {
+    if (problem.ViewFixed(view)) b.segment<3>(layout.Center(view)).setZero();
+  }
+  for (int point = 0; point < problem.num_points; ++point) {
+    if (problem.PointFixed(point)) b.segment<3>(layout.Point(point)).setZero();
+  }
   const Eigen::VectorXd expected = H.ldlt().solve(b);
-  EXPECT_LT((system.Solve(S, b) - expected).norm(), 1e-9 * expected.norm());
+  EXPECT_LT((system.Solve(S, pushed) - expected).norm(), 1e-9 * expected.norm());
 }
 
 TEST(StructureSystem, SolvesAsTheDenseSystemDoes) {
@@ -50,6 +70,19 @@ TEST(StructureSystem, SolvesAsTheDenseSystemDoes) {
   ring.max_track_length = 5;
   ExpectSameAsDense(ProblemFromScene(MakeScene(ring)));
   ExpectSameAsDense(ProblemFromScene(MakeScene(DrivingOptions(40, 200, 1))));
+}
+
+TEST(StructureSystem, LeavesWhatIsHeldWhereItIs) {
+  SceneOptions ring;
+  ring.num_views = 12;
+  ring.num_points = 40;
+  ring.max_track_length = 5;
+  MinimaxProblem problem = ProblemFromScene(MakeScene(ring));
+  problem.view_fixed.assign(problem.num_views(), false);
+  problem.point_fixed.assign(problem.num_points, false);
+  for (const int view : {3, 4, 11}) problem.view_fixed[view] = true;
+  for (const int point : {0, 7, 39}) problem.point_fixed[point] = true;
+  ExpectSameAsDense(problem);
 }
 
 TEST(StructureSystem, CountsBothOfTwoSightsFromOneView) {

@@ -1,0 +1,98 @@
+#include "ba/marginal_covariance.h"
+
+#include <deque>
+
+#include <ceres/covariance.h>
+#include <ceres/loss_function.h>
+#include <gtest/gtest.h>
+
+#include "ba/pose_manifold.h"
+#include "ba/reprojection_cost.h"
+#include "tests/ba/ba_scene.h"
+
+namespace rotslam {
+namespace {
+
+// A street as a Ceres problem at the truth: poses, points, the first two poses held.
+class StreetProblem {
+ public:
+  explicit StreetProblem(int num_held = 2)
+      : scene_(MakeBaScene({.num_frames = 8, .num_points = 60, .noise_px = 0.5})),
+        problem_(Options()) {
+    poses_.reserve(scene_.truth.cam_from_world.size());
+    for (const auto& [frame, rotation] : scene_.truth.cam_from_world) {
+      Eigen::Matrix<double, 7, 1> pose;
+      pose << rotation.Quaternion().coeffs(), scene_.truth.center_in_world.at(frame);
+      poses_.push_back(pose);
+      problem_.AddParameterBlock(poses_.back().data(), 7, &manifold_);
+      (frame.value < num_held ? held_ : cameras_).push_back(poses_.back().data());
+    }
+    for (double* pose : held_) problem_.SetParameterBlockConstant(pose);
+    for (const Track& track : scene_.truth.tracks) {
+      double* const point = scene_.truth.point_in_world.at(track.id).data();
+      points_.push_back(point);
+      for (const Observation& observation : track.observations) {
+        costs_.emplace_back(scene_.camera, observation.keypoint_px, observation.sigma_px);
+        problem_.AddResidualBlock(
+            &costs_.back(), &loss_, poses_[observation.frame.value].data(), point);
+      }
+    }
+  }
+
+  ceres::Problem& problem() { return problem_; }
+  const std::vector<double*>& cameras() const { return cameras_; }
+  const std::vector<double*>& points() const { return points_; }
+
+ private:
+  static ceres::Problem::Options Options() {
+    ceres::Problem::Options options;
+    options.cost_function_ownership = ceres::DO_NOT_TAKE_OWNERSHIP;
+    options.loss_function_ownership = ceres::DO_NOT_TAKE_OWNERSHIP;
+    options.manifold_ownership = ceres::DO_NOT_TAKE_OWNERSHIP;
+    return options;
+  }
+
+  BaScene scene_;
+  PoseManifold manifold_;
+  ceres::HuberLoss loss_{1.0};
+  std::deque<ReprojectionCost> costs_;
+  std::vector<Eigen::Matrix<double, 7, 1>> poses_;
+  std::vector<double*> held_, cameras_, points_;
+  ceres::Problem problem_;
+};
+
+TEST(MarginalCovariances, EqualThoseOfCeres) {
+  StreetProblem street;
+  double* const first = street.cameras().front();
+  double* const last = street.cameras().back();
+  const auto ours = MarginalCovariances(
+      street.problem(), street.points(), street.cameras(), {{last}, {first, last}, {}});
+  ASSERT_TRUE(ours.has_value());
+  ceres::Covariance::Options options;
+  options.algorithm_type = ceres::DENSE_SVD;
+  ceres::Covariance covariance(options);
+  const std::vector<std::pair<const double*, const double*>> blocks = {{last, last}, {first, last}};
+  ASSERT_TRUE(covariance.Compute(blocks, &street.problem()));
+  Eigen::Matrix<double, 6, 6, Eigen::RowMajor> of_last;
+  Eigen::Matrix<double, 6, 6, Eigen::RowMajor> between;
+  covariance.GetCovarianceBlockInTangentSpace(last, last, of_last.data());
+  covariance.GetCovarianceBlockInTangentSpace(first, last, between.data());
+  EXPECT_LT(((*ours)[0] - of_last).norm(), 1e-6 * of_last.norm());
+  EXPECT_LT(((*ours)[1].topRightCorner<6, 6>() - between).norm(), 1e-6 * between.norm());
+  EXPECT_LT(((*ours)[1].bottomRightCorner<6, 6>() - of_last).norm(), 1e-6 * of_last.norm());
+  EXPECT_EQ((*ours)[2].size(), 0);
+}
+
+TEST(MarginalCovariances, SayNoWhereThePointsAreOpen) {
+  StreetProblem street;
+  // A point that nothing sees any more.
+  std::vector<ceres::ResidualBlockId> seen;
+  street.problem().GetResidualBlocksForParameterBlock(street.points().front(), &seen);
+  for (const ceres::ResidualBlockId id : seen) street.problem().RemoveResidualBlock(id);
+  EXPECT_FALSE(MarginalCovariances(
+                   street.problem(), street.points(), street.cameras(), {{street.cameras().back()}})
+                   .has_value());
+}
+
+}  // namespace
+}  // namespace rotslam
