@@ -42,6 +42,7 @@ struct LensSigmas {
   double k2 = 0.0;
 };
 
+/// How bundle adjustment ended.
 enum class BundleStatus {
   kNotRun,
   kConverged,
@@ -50,6 +51,7 @@ enum class BundleStatus {
   kSolverFailed,
 };
 
+/// A status in words.
 const char* Name(BundleStatus status);
 
 /// Sizes of reprojection errors |projected - keypoint|, in pixels (not in sigmas).
@@ -76,6 +78,7 @@ struct BundleRoundSummary {
   double solver_seconds = 0.0;
 };
 
+/// All rounds together. Costs are half the sum of robust squared residuals, in sigmas.
 struct BundleSummary {
   double initial_cost = 0.0;  // of the first round that takes all tracks
   double final_cost = 0.0;    // of the last
@@ -94,6 +97,7 @@ struct BundleSummary {
   std::vector<BundleRoundSummary> rounds;
 };
 
+/// What bundle adjustment gives, usable or not.
 struct BundleResult {
   BundleStatus status = BundleStatus::kNotRun;
   std::string message;  // one sentence for a person

@@ -12,6 +12,7 @@
 
 namespace rotslam {
 
+/// How the solver ended; "no" is an answer, not an error.
 enum class KrotStatus {
   kNotRun,
   kConverged,       // positions found, brackets as narrow as asked
@@ -21,6 +22,7 @@ enum class KrotStatus {
   kSolverFailed,    // the linear programs gave no structure
 };
 
+/// Why an observation has no part in the answer.
 enum class RemovalReason {
   kNotFinite,       // bearing is not finite or not of unit length
   kDuplicate,       // a second observation of its frame in one track
@@ -29,6 +31,7 @@ enum class RemovalReason {
   kOtherComponent,  // its view lies in another component than the track's point
 };
 
+/// An observation that the solver has taken out.
 struct RemovedObservation {
   TrackId track;
   FrameId frame;
@@ -41,6 +44,7 @@ struct ActiveObservation {
   FrameId frame;
 };
 
+/// Positions, points, and how far the largest residual is from the least possible one.
 struct KrotSolution {
   KrotStatus status = KrotStatus::kNotRun;
   std::string message;        // one sentence for a person
@@ -76,9 +80,8 @@ struct KrotSolution {
 /// @param tracks          bearings unit, in the camera frame.
 /// @param camera          converts pixels to normalised units (MeanFocal) and nothing else.
 /// @param sigma_rad       standard deviations of the orientations against the first one, where
-/// known.
-///                        Between views the difference of their variances counts, as for an
-///                        odometry's chain: what views share moves them together.
+///                        known. Between views the difference of their variances counts, as for
+///                        an odometry's chain: what views share moves them together.
 /// @return  see KrotSolution. Throws std::invalid_argument when an option is out of range, a track
 ///          names a view without rotation, or the camera has no focal length.
 /// Error:   truth to 1e-6 (relative to the scene) on clean scenes (KnownRotation tests).
