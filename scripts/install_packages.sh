@@ -14,13 +14,15 @@ packages=(
   coinor-libclp-dev libceres-dev libgoogle-glog-dev
   # output and apps
   libcli11-dev libpcl-dev libsqlite3-dev nlohmann-json3-dev
+  # the report and the plots
+  libcairo2-dev libjs-three
   # tests; GLPK and OpenGV to compare with, numpy for the independent check of `rotslam eval`
   libglpk-dev libgmock-dev libgtest-dev libopengv-dev python3-numpy
 )
 # Not needed: libbenchmark-dev, for the benchmarks (ROTSLAM_BUILD_BENCHMARKS).
 if [[ ${1:-} == --ci ]]; then
-  # colmap: the tests that hand it our models, which skip without it
-  packages+=(clang-format-14 clang-tidy-14 colmap)
+  # colmap: the tests that hand it our models; chromium: the one that opens the report; they skip without
+  packages+=(clang-format-14 clang-tidy-14 chromium colmap)
 elif [[ $# -gt 0 ]]; then
   echo "usage: ${0##*/} [--ci]" >&2
   exit 2
