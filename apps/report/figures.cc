@@ -59,6 +59,8 @@ Eigen::Matrix3d LevelFromWorld(const Trajectory& poses) {
   return level_from_world;
 }
 
+bool IsHeld(const Segment& segment) { return segment.kind != "translating"; }
+
 struct Paths {
   std::vector<Eigen::Vector3d> estimate;
   std::vector<Eigen::Vector3d> truth;
@@ -125,7 +127,7 @@ void DrawMap(const RunData& run,
   axes.DrawLine(truth, {kTruth, 1.0, 3.5}, drawing);
   std::vector<Eigen::Vector2d> held;
   for (const Segment& segment : run.segments) {
-    if (segment.kind == "translating") continue;
+    if (!IsHeld(segment)) continue;
     held.push_back(axes.OnPage(estimate[segment.first_frame]));
   }
   drawing.AddDots(std::move(held), 5.0, kOrange);
@@ -136,7 +138,9 @@ Drawing TrajectoryFigure(const RunData& run) {
   const Paths paths = LevelPaths(run);
   std::vector<LegendEntry> legend = {{"estimate", {kBlue, 1.4}}};
   if (!paths.truth.empty()) legend.push_back({"ground truth", {kTruth, 1.0, 3.5}});
-  legend.push_back({"turning in place, or at rest", {kOrange, 5.0}});
+  if (std::any_of(run.segments.begin(), run.segments.end(), IsHeld)) {
+    legend.push_back({"turning in place, or at rest", {kOrange, 5.0}});
+  }
   legend.push_back({"points", {kCloud, 2.0}});
   DrawLegend(legend, drawing);
   DrawMap(run,

@@ -270,22 +270,31 @@ Json TruthJson(const RunData& run, int step) {
   return data;
 }
 
-// Where the cloud's points lie in the pictures, in 1/65535 of their width and height.
-std::map<int, std::vector<std::uint16_t>> FeaturesIn(const std::vector<int>& frames,
-                                                     const RunMap& map,
-                                                     int limit) {
-  std::map<int, std::vector<std::uint16_t>> features;
+// At most `limit` of the points, evenly over their order, in 1/65535 of the picture's size.
+std::vector<std::uint16_t> Packed(const std::vector<Eigen::Array2d>& places, int limit) {
+  const int step = StepFor(places.size(), limit);
+  std::vector<std::uint16_t> packed;
+  packed.reserve(2 * (places.size() / step + 1));
+  for (std::size_t k = 0; k < places.size(); k += step) {
+    for (const double value : places[k]) {
+      packed.push_back(static_cast<std::uint16_t>(std::lround(65535.0 * value)));
+    }
+  }
+  return packed;
+}
+
+// Where the cloud's points lie in the pictures of these frames, as a share of width and height.
+std::map<int, std::vector<Eigen::Array2d>> FeaturesIn(const std::vector<int>& frames,
+                                                      const RunMap& map) {
+  std::map<int, std::vector<Eigen::Array2d>> features;
   for (const int frame : frames) features[frame];
   const Eigen::Array2d size_px(map.camera.width, map.camera.height);
   for (const MapTrack& track : map.tracks) {
     for (const Observation& observation : track.track.observations) {
       const auto found = features.find(observation.frame.value);
-      if (found == features.end() || std::ssize(found->second) >= 2 * limit) continue;
+      if (found == features.end()) continue;
       const Eigen::Array2d place = (observation.keypoint_px.array() + 0.5) / size_px;
-      if ((place < 0.0).any() || (place > 1.0).any()) continue;
-      for (const double value : place) {
-        found->second.push_back(static_cast<std::uint16_t>(std::lround(65535.0 * value)));
-      }
+      if ((place >= 0.0).all() && (place <= 1.0).all()) found->second.push_back(place);
     }
   }
   return features;
@@ -293,13 +302,14 @@ std::map<int, std::vector<std::uint16_t>> FeaturesIn(const std::vector<int>& fra
 
 Json ThumbnailsData(const RunData& run, const Thumbnails& thumbnails, const PageLimits& limits) {
   Json list = Json::array();
-  std::map<int, std::vector<std::uint16_t>> features;
-  if (run.cloud)
-    features = FeaturesIn(thumbnails.frames, *run.cloud, limits.max_features_per_frame);
+  std::map<int, std::vector<Eigen::Array2d>> features;
+  if (run.cloud) features = FeaturesIn(thumbnails.frames, *run.cloud);
   for (std::size_t k = 0; k < thumbnails.frames.size(); ++k) {
     Json entry = {{"frame", thumbnails.frames[k]}, {"jpeg", Base64(thumbnails.jpegs[k])}};
     const auto found = features.find(thumbnails.frames[k]);
-    if (found != features.end()) entry["features"] = Array(found->second, 2);
+    if (found != features.end()) {
+      entry["features"] = Array(Packed(found->second, limits.max_features_per_frame), 2);
+    }
     list.push_back(std::move(entry));
   }
   return {{"problem", thumbnails.problem}, {"images", list}};

@@ -71,14 +71,18 @@ function bestRotations() { return data.truth.trajectory || data.truth.rotations;
 // What a reader must know before believing a picture.
 function buildNotes() {
   const note = (text) => $('notes').append(h('div', {class: 'note'}, text));
+  const warn = (text) => $('notes').append(h('div', {class: 'note warning'}, text));
   if (!hasPositions) {
     note(summary.command === 'rotations' ?
       'Orientations only: `rotslam rotations` finds no positions. The view shows where the camera looked.' :
       'There are no positions: the camera never leaves its place, or no map was found. The view shows where the camera looked.');
   }
-  const camera = summary.camera || {};
-  if (camera.guessed || (summary.sequence || {}).focal_guess || camera.focal_guess) {
-    note('The focal length is a guess, not a calibration: angles and scale drift with its error.');
+  if (summary.interrupted) note('The run was interrupted: this is what it had found by then.');
+  const calibration = summary.calibration || {};
+  if (String(calibration.source).startsWith('focal_guess')) {
+    warn(`No calibration: the focal length began as a guess of ${significant(calibration.guess_px, 5)} px ` +
+      `and is ${significant(calibration.refined_px, 5)} px now. Angles and shape are as wrong as it is; ` +
+      'a calibrated camera does better (rotslam calibrate).');
   }
   if (counts.unreadable_frames) note(whole(counts.unreadable_frames) + ' frames could not be read.');
   if (counts.frames_without_edge) {
@@ -315,7 +319,7 @@ function buildLoops(parent) {
   element.append(sourceLine('loops.csv'));
 }
 
-// The view-graph as a matrix: a dot where two frames have a relative rotation, the darker the better known.
+// The view-graph as a matrix: a dot where two frames have a relative rotation, the stronger the better known.
 function drawGraph(canvas) {
   const ratio = window.devicePixelRatio || 1, side = canvas.clientWidth;
   canvas.width = canvas.height = side * ratio;
@@ -373,7 +377,7 @@ function buildGraph(parent) {
   canvas.style.display = 'block';
   const shown = graph.sigma_deg.length < graph.count ? `${whole(graph.sigma_deg.length)} of them are shown. ` : '';
   panel(parent, 'View-graph', canvas, h('p', {class: 'source'},
-    `${whole(graph.count)} relative rotations between frames, darker where better known. ${shown}` +
+    `${whole(graph.count)} relative rotations between frames, stronger where better known. ${shown}` +
     (data.loops.accepted.length > 0 ? 'Rings: accepted loops.' : '')), sourceLine('view_graph.g2o', 'loops.csv'));
   redraws.push(() => drawGraph(canvas));
 }

@@ -145,12 +145,17 @@ RunData ReadRunData(const fs::path& run) {
                              ": has no frames; run the sequence again");
   }
   const auto is_there = [&](const char* name) { return fs::exists(run / name); };
+  if (is_there("loops.csv")) data.loops = ReadLoopsCsv(run / "loops.csv");
+  if (is_there("view_graph.g2o")) data.edges = ReadG2o(run / "view_graph.g2o").graph.edges();
+  // Whatever else lies there is then of an older run.
+  if (data.summary.value("command", "") == "rotations" ||
+      data.summary.value("interrupted", false)) {
+    return data;
+  }
   if (is_there("trajectory_tum.txt")) {
     data.poses = ReadPoses(run / "trajectory_tum.txt", data.rotations);
   }
   if (is_there("segments.csv")) data.segments = ReadSegmentsCsv(run / "segments.csv");
-  if (is_there("loops.csv")) data.loops = ReadLoopsCsv(run / "loops.csv");
-  if (is_there("view_graph.g2o")) data.edges = ReadG2o(run / "view_graph.g2o").graph.edges();
   if (is_there("map.bin")) data.keyframe_map = ReadRunMap(run / "map.bin");
   if (is_there("map_all_frames.bin")) data.cloud = ReadRunMap(run / "map_all_frames.bin");
   return data;

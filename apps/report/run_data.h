@@ -35,6 +35,8 @@ struct TruthData {
 };
 
 /// Everything that a run has left in its folder, as far as it is there.
+// NOLINTNEXTLINE(bugprone-exception-escape): it suspects the JSON library's move, which is
+// noexcept.
 struct RunData {
   std::filesystem::path directory;
   nlohmann::ordered_json summary;       // summary.json

@@ -93,6 +93,20 @@ class Scene {
       new THREE.LineBasicMaterial({transparent: opacity < 1, opacity}));
   }
 
+  // Round ones of so many pixels.
+  dots(positions, size) {
+    if (!this.disc) {
+      const canvas = h('canvas', {width: 64, height: 64});
+      const context = canvas.getContext('2d');
+      context.fillStyle = '#fff';
+      context.arc(32, 32, 31, 0, 7);
+      context.fill();
+      this.disc = new THREE.CanvasTexture(canvas);
+    }
+    return new THREE.Points(this.geometry(positions), new THREE.PointsMaterial(
+      {size: size * Math.min(2, window.devicePixelRatio || 1), sizeAttenuation: false, map: this.disc, alphaTest: 0.5}));
+  }
+
   addAll() {
     if (cloud && hasPositions) this.addCloud();
     if (!hasPositions) this.addSphere();
@@ -138,10 +152,10 @@ class Scene {
       const solid = [], loose = [], dots = [];
       for (let k = 0; k < numFrames; ++k) {
         if (kindOf[k] !== kind) continue;
-        dots.push(...at(k));
-        if (k + 1 >= numFrames) continue;
         const segment = data.segments[segmentOf[k]];
-        (segment && segment.scale === 'continuity' ? loose : solid).push(...at(k), ...at(k + 1));
+        const isLoose = segment && segment.scale === 'continuity';
+        if (!isLoose || k % 6 < 3) dots.push(...at(k));
+        if (k + 1 < numFrames) (isLoose ? loose : solid).push(...at(k), ...at(k + 1));
       }
       if (dots.length === 0) continue;
       const group = new THREE.Group();
@@ -153,8 +167,12 @@ class Scene {
         dashed.computeLineDistances();
         group.add(dashed);
       }
-      const size = kind === 0 ? (numFrames > 1500 ? 2.5 : 4) : 7;
-      group.add(new THREE.Points(this.geometry(dots), new THREE.PointsMaterial({size, sizeAttenuation: false})));
+      const size = kind === 0 ? (numFrames > 1500 ? 2.5 : 4.5) : 12;
+      const points = this.dots(dots, size);
+      // Held frames lie on one spot, which the path around it shall not hide.
+      points.material.depthTest = kind === 0;
+      points.renderOrder = kind;
+      group.add(points);
       this.layer(names[kind], labels[kind], kHeldColors[kind], group);
     }
   }
@@ -215,18 +233,18 @@ class Scene {
   addMarker() {
     const group = new THREE.Group();
     this.markerLines = this.lines(new Array(48).fill(0));
-    this.markerDot = new THREE.Points(this.geometry([0, 0, 0]),
-      new THREE.PointsMaterial({size: 11, sizeAttenuation: false}));
+    this.markerDot = this.dots([0, 0, 0], 12);
+    this.markerDot.material.depthTest = false;
     for (const object of [this.markerLines, this.markerDot]) {
       object.frustumCulled = false;
-      object.renderOrder = 2;
+      object.renderOrder = 4;
       group.add(object);
     }
     this.layer('marker', 'camera now', 'red', group);
   }
 
   setFrame(place) {
-    const size = hasPositions ? Math.max(2.2 * (this.frustumSize || 0), 0.035 * this.pathSize) : 1;
+    const size = hasPositions ? Math.max(2.2 * (this.frustumSize || 0), 0.055 * this.pathSize) : 1;
     this.markerLines.geometry.attributes.position.array.set(this.frustumLines(place, size));
     this.markerLines.geometry.attributes.position.needsUpdate = true;
     const dot = hasPositions ? this.centerOf(place) : new THREE.Vector3().fromArray(this.path, 3 * place);
@@ -291,7 +309,8 @@ class Scene {
   setColors() {
     for (const {colorName, object} of Object.values(this.layers)) {
       object.traverse((part) => {
-        if (part.material && !part.material.vertexColors) part.material.color.set(color(colorName));
+        // Points have their own colours; on a light page even white ones must be seen.
+        if (part.material) part.material.color.set(color(part.material.vertexColors ? 'cloud' : colorName));
       });
     }
     this.drawSoon();

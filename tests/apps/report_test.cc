@@ -98,9 +98,9 @@ class Report : public testing::Test {
     WriteSummaryWith(kHostile);
   }
 
-  void WriteSummaryWith(const std::string& sequence) const {
+  void WriteSummaryWith(const std::string& sequence, const std::string& command = "run") const {
     RunSummary summary;
-    summary.command = "rotations";
+    summary.command = command;
     summary.sequence = {{"path", sequence}};
     summary.camera = SmallCamera();
     summary.counts = {{"frames", std::int64_t{kNumFrames}}};
@@ -186,6 +186,8 @@ TEST_F(Report, SaysWhatItsFilesSay) {
 }
 
 TEST_F(Report, WithoutPositionsHasTheRest) {
+  AddPositions();  // of an older run into the same folder
+  WriteSummaryWith(kHostile, "rotations");
   const Json data = Data();
   EXPECT_FALSE(data["frames"].contains("position"));
   EXPECT_FALSE(data.contains("cloud"));
