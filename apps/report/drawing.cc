@@ -42,7 +42,8 @@ std::string Rgb(const Color& color) {
 std::string Points(const std::vector<Eigen::Vector2d>& points) {
   std::string text;
   for (const Eigen::Vector2d& point : points) {
-    text += (text.empty() ? "" : " ") + Number(point.x()) + "," + Number(point.y());
+    if (!text.empty()) text += ' ';
+    text.append(Number(point.x())).append(",").append(Number(point.y()));
   }
   return text;
 }

@@ -35,8 +35,8 @@ struct TruthData {
 };
 
 /// Everything that a run has left in its folder, as far as it is there.
-// NOLINTNEXTLINE(bugprone-exception-escape): it suspects the JSON library's move, which is
-// noexcept.
+// The check suspects the move of the JSON library, which is noexcept.
+// NOLINTNEXTLINE(bugprone-exception-escape)
 struct RunData {
   std::filesystem::path directory;
   nlohmann::ordered_json summary;       // summary.json
