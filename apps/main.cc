@@ -60,6 +60,8 @@ int main(int argc, char** argv) {
     rotslam::AddAverageCommand(app, action);
     rotslam::AddEvalCommand(app, action);
     rotslam::AddSimulateCommand(app, action);
+    rotslam::AddReportCommand(app, action);
+    rotslam::AddPlotCommand(app, action);
     rotslam::AddPanoramaCommand(app, action);
     rotslam::AddVocabularyCommand(app, action);
     rotslam::AddBatchCommand(app, action);

@@ -1,6 +1,5 @@
 #include <cstdio>
 #include <filesystem>
-#include <fstream>
 #include <memory>
 #include <optional>
 #include <stdexcept>
@@ -12,9 +11,10 @@
 
 #include "apps/command.h"
 #include "apps/input.h"
+#include "apps/run_summary.h"
 #include "apps/stitching.h"
 #include "output/atomic_file.h"
-#include "output/text_file.h"
+#include "output/segments.h"
 #include "output/trajectory.h"
 #include "rotodom/camera/read_camera.h"
 #include "rotodom/sequence/sequence.h"
@@ -43,24 +43,9 @@ struct Frames {
   int last = 0;
 };
 
-nlohmann::json ReadSummaryOf(const fs::path& run) {
-  const fs::path path = run / "summary.json";
-  std::ifstream file(path);
-  if (!file) {
-    throw std::runtime_error(path.string() +
-                             ": cannot be read; give the folder that `rotslam run` or `rotslam "
-                             "rotations` has written to");
-  }
-  nlohmann::json summary = nlohmann::json::parse(file, nullptr, false);
-  if (summary.is_discarded() || !summary.contains("sequence") || !summary.contains("camera")) {
-    throw std::runtime_error(path.string() + ": is no summary of a run; run the sequence again");
-  }
-  return summary;
-}
-
-Camera CameraOf(const nlohmann::json& summary, const std::string& path) {
+Camera CameraOf(const nlohmann::ordered_json& summary, const std::string& path) {
   try {
-    const nlohmann::json& json = summary.at("camera");
+    const nlohmann::ordered_json& json = summary.at("camera");
     Camera camera;
     for (const CameraModel model :
          {CameraModel::kPinhole, CameraModel::kRadtan, CameraModel::kEquidistant}) {
@@ -79,35 +64,6 @@ Camera CameraOf(const nlohmann::json& summary, const std::string& path) {
     throw std::runtime_error(path + ": its camera cannot be used (" + error.what() +
                              "); give one with --camera FILE");
   }
-}
-
-SequenceOptions SequenceOptionsOf(const nlohmann::json& summary) {
-  SequenceOptions options;
-  const nlohmann::json& json = summary.at("options").at("sequence");
-  options.first = json.at("first");
-  options.last = json.at("last");
-  options.stride = json.at("stride");
-  options.fps = json.at("fps");
-  return options;
-}
-
-struct SegmentLine {
-  Frames frames;
-  std::string kind;
-};
-
-std::vector<SegmentLine> ReadSegmentLines(const fs::path& path) {
-  std::vector<SegmentLine> segments;
-  const std::vector<TextRow> rows = ReadTextRows(path);
-  for (std::size_t k = 1; k < rows.size(); ++k) {
-    if (rows[k].words.size() < 3) {
-      throw std::runtime_error(AtLine(path, rows[k].line, "expected first, last frame and kind"));
-    }
-    segments.push_back({{static_cast<int>(NumberAt(path, rows[k], 0)),
-                         static_cast<int>(NumberAt(path, rows[k], 1))},
-                        rows[k].words[2]});
-  }
-  return segments;
 }
 
 Frames WithinRun(Frames frames, int num_frames) {
@@ -133,20 +89,21 @@ Frames ChooseFrames(const PanoramaFlags& flags, int num_frames) {
     }
     return WithinRun({0, -1}, num_frames);
   }
-  const std::vector<SegmentLine> segments = ReadSegmentLines(path);
+  const std::vector<Segment> segments = ReadSegmentsCsv(path);
   if (flags.segment) {
     if (*flags.segment < 0 || *flags.segment >= std::ssize(segments)) {
       throw std::runtime_error(path.string() + ": has no segment " +
                                std::to_string(*flags.segment) + "; there are " +
                                std::to_string(segments.size()) + ", counted from 0");
     }
-    return WithinRun(segments[*flags.segment].frames, num_frames);
+    const Segment& segment = segments[*flags.segment];
+    return WithinRun({segment.first_frame, segment.last_frame}, num_frames);
   }
-  const SegmentLine* longest = nullptr;
-  const auto length = [](const SegmentLine& segment) {
-    return segment.frames.last - segment.frames.first;
+  const Segment* longest = nullptr;
+  const auto length = [](const Segment& segment) {
+    return segment.last_frame - segment.first_frame;
   };
-  for (const SegmentLine& segment : segments) {
+  for (const Segment& segment : segments) {
     if (segment.kind != "rotating") continue;
     if (longest == nullptr || length(segment) > length(*longest)) longest = &segment;
   }
@@ -155,7 +112,7 @@ Frames ChooseFrames(const PanoramaFlags& flags, int num_frames) {
                              ": the camera nowhere turns in one place; name frames with --first "
                              "and --last to stitch them all the same");
   }
-  return WithinRun(longest->frames, num_frames);
+  return WithinRun({longest->first_frame, longest->last_frame}, num_frames);
 }
 
 // Frames so far apart that each shows something new; most videos repeat themselves.
@@ -170,9 +127,9 @@ std::vector<int> Thinned(const Trajectory& poses, const Frames& frames, const Ca
   return chosen;
 }
 
-std::string SequencePath(const PanoramaFlags& flags, const nlohmann::json& summary) {
+std::string SequencePath(const PanoramaFlags& flags, const nlohmann::ordered_json& summary) {
   if (!flags.sequence.empty()) return flags.sequence;
-  const nlohmann::json& sequence = summary.at("sequence");
+  const nlohmann::ordered_json& sequence = summary.at("sequence");
   if (!sequence.contains("path")) {
     throw std::runtime_error(flags.run + ": does not say where its images are; use --sequence");
   }
@@ -191,7 +148,7 @@ void WriteImage(const fs::path& path, const cv::Mat& image) {
 
 int MakePanorama(const PanoramaFlags& flags) {
   const fs::path run = flags.run;
-  const nlohmann::json summary = ReadSummaryOf(run);
+  const nlohmann::ordered_json summary = ReadSummaryOf(run);
   const fs::path refined = run / "trajectory_tum.txt";
   const Trajectory poses =
       ReadTrajectory(fs::exists(refined) ? refined : run / "rotations_tum.txt");

@@ -8,6 +8,7 @@
 #include "apps/pipeline.h"
 #include "apps/progress.h"
 #include "apps/run_directory.h"
+#include "apps/run_report.h"
 
 namespace rotslam {
 namespace {
@@ -16,6 +17,7 @@ struct RotationsFlags {
   CommonFlags common;
   InputFlags input;
   std::string averaging;  // empty: as the configuration says
+  bool use_report = true;
 };
 
 int FindAndWriteRotations(const RotationsFlags& flags) {
@@ -36,8 +38,10 @@ int FindAndWriteRotations(const RotationsFlags& flags) {
   summary.seconds.push_back(
       {"total", std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count()});
   WriteSummary(directory / "summary.json", summary);
+  if (flags.use_report) WriteReportOfRun(directory, flags.common, progress);
   progress.Say("wrote " + (directory / "rotations_tum.txt").string() +
-               ", rotations.csv, loops.csv, view_graph.g2o, summary.json");
+               ", rotations.csv, loops.csv, view_graph.g2o, summary.json" +
+               (flags.use_report ? ", report.html" : ""));
   return 0;
 }
 
@@ -55,6 +59,7 @@ void AddRotationsCommand(CLI::App& app, Action& action) {
                    "What is averaged at every frame: off (orientations are chained), window (the "
                    "newest ones; default) or global (all; the time grows with the sequence)")
       ->check(CLI::IsMember({"off", "window", "global"}));
+  AddReportFlag(*command, flags->use_report);
   AddCommonFlags(*command, flags->common);
   command->footer("Example: rotslam rotations footage.mp4 --camera phone.yaml --out runs/footage");
   command->callback(

@@ -9,6 +9,7 @@
 #include "apps/positions.h"
 #include "apps/progress.h"
 #include "apps/run_directory.h"
+#include "apps/run_report.h"
 #include "output/ply.h"
 #include "output/trajectory.h"
 
@@ -22,6 +23,7 @@ struct RunFlags {
   InputFlags input;
   KrotFlags krot;
   bool ascii = false;
+  bool use_report = true;
 };
 
 double SecondsSince(Clock::time_point start) {
@@ -70,11 +72,13 @@ int Run(const RunFlags& flags) {
     progress.Warn(
         "the camera never leaves its place, so there are no positions and no points to find");
   }
+  if (flags.use_report) WriteReportOfRun(directory, flags.common, progress);
   progress.Say("wrote " + directory.string() +
                ": trajectory_tum.txt, trajectory_kitti.txt, keyframes_tum.txt, "
                "rotations_tum.txt, rotations.csv, loops.csv, cloud.ply, cameras.ply, segments.csv, "
                "view_graph.g2o, "
-               "known_rotation.txt, map.bin, map_all_frames.bin, summary.json");
+               "known_rotation.txt, map.bin, map_all_frames.bin, summary.json" +
+               (flags.use_report ? ", report.html" : ""));
   if (positions.failure.empty()) return 0;
   throw std::runtime_error("orientations are in " + directory.string() +
                            ", positions are not: " + positions.failure);
@@ -94,6 +98,7 @@ void AddRunCommand(CLI::App& app, Action& action) {
       "Orientations from elsewhere (a gimbal, an IMU, another SLAM), camera->world: "
       "a TUM file or a rotations.csv; the images then give tracks and positions");
   command->add_flag("--ascii", flags->ascii, "Write the PLY files as text");
+  AddReportFlag(*command, flags->use_report);
   AddCommonFlags(*command, flags->common);
   command->footer("Example: rotslam run kitti/sequences/00 --out runs/kitti00");
   command->callback([flags, &action] { action = [flags] { return Run(*flags); }; });

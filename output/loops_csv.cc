@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <cstddef>
 #include <stdexcept>
 #include <string>
 
@@ -27,6 +28,25 @@ void WriteLoopsCsv(const std::filesystem::path& path, const std::vector<LoopRow>
             FormatNumber("%.6g", row.scaled_angle_deg) + '\n';
   }
   ReplaceFile(path, text);
+}
+
+std::vector<LoopRow> ReadLoopsCsv(const std::filesystem::path& path) {
+  constexpr std::size_t kNumColumns = 8;
+  const std::vector<TextRow> texts = ReadCsvRows(path, kNumColumns);
+  std::vector<LoopRow> rows;
+  rows.reserve(texts.size());
+  for (const TextRow& text : texts) {
+    const auto number = [&](std::size_t column) { return NumberAt(path, text, column); };
+    rows.push_back({static_cast<int>(number(0)),
+                    static_cast<int>(number(1)),
+                    number(2),
+                    static_cast<int>(number(3)),
+                    number(4),
+                    number(5) != 0.0,
+                    number(6),
+                    number(7)});
+  }
+  return rows;
 }
 
 }  // namespace rotslam

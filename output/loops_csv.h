@@ -23,4 +23,7 @@ struct LoopRow {
 /// std::runtime_error when the file cannot be written; never leaves half a file.
 void WriteLoopsCsv(const std::filesystem::path& path, const std::vector<LoopRow>& rows);
 
+/// Reads what WriteLoopsCsv has written. Throws std::runtime_error with file, line and reason.
+std::vector<LoopRow> ReadLoopsCsv(const std::filesystem::path& path);
+
 }  // namespace rotslam

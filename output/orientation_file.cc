@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <fstream>
 #include <stdexcept>
 #include <string>
 
@@ -28,26 +27,7 @@ Rotation RotationAt(const std::filesystem::path& path, const TextRow& row, std::
   return Rotation(Eigen::Quaterniond(q[3], q[0], q[1], q[2]));
 }
 
-// Cells may be empty, so the line is cut at its commas.
-TextRow CutAtCommas(const std::string& line, int number) {
-  TextRow row{number, {""}};
-  for (const char c : line) {
-    if (c == ',') {
-      row.words.emplace_back();
-    } else if (c != '\r' && c != ' ') {
-      row.words.back() += c;
-    }
-  }
-  return row;
-}
-
 StampedRotation ParseCsvRow(const std::filesystem::path& path, const TextRow& row) {
-  if (row.words.size() != kCsvColumns) {
-    throw std::runtime_error(AtLine(path,
-                                    row.line,
-                                    "expected " + std::to_string(kCsvColumns) + " columns, found " +
-                                        std::to_string(row.words.size())));
-  }
   StampedRotation stamped{NumberAt(path, row, 1), RotationAt(path, row, 2), std::nullopt};
   const bool has_sigma = !row.words[6].empty() && !row.words[7].empty() && !row.words[8].empty();
   if (!has_sigma) return stamped;
@@ -59,13 +39,9 @@ StampedRotation ParseCsvRow(const std::filesystem::path& path, const TextRow& ro
 }
 
 std::vector<StampedRotation> ReadCsv(const std::filesystem::path& path) {
-  std::ifstream file(path);
   std::vector<StampedRotation> orientations;
-  std::string line;
-  std::getline(file, line);  // the columns' names
-  for (int number = 2; std::getline(file, line); ++number) {
-    if (line.empty() || line == "\r") continue;
-    orientations.push_back(ParseCsvRow(path, CutAtCommas(line, number)));
+  for (const TextRow& row : ReadCsvRows(path, kCsvColumns)) {
+    orientations.push_back(ParseCsvRow(path, row));
   }
   return orientations;
 }

@@ -1,6 +1,8 @@
 #include "output/rotations_csv.h"
 
 #include <cmath>
+#include <cstddef>
+#include <sstream>
 #include <stdexcept>
 
 #include "output/atomic_file.h"
@@ -8,6 +10,9 @@
 
 namespace rotslam {
 namespace {
+
+constexpr double kMaxNormError = 1e-2;
+constexpr std::size_t kNumColumns = 11;
 
 void Require(const RotationRow& row) {
   const auto refuse = [&](const std::string& what) {
@@ -21,6 +26,29 @@ void Require(const RotationRow& row) {
       refuse("\"" + flag + "\" is no flag");
     }
   }
+}
+
+std::vector<std::string> CutAtBars(const std::string& words) {
+  std::vector<std::string> flags;
+  std::istringstream stream(words);
+  for (std::string flag; std::getline(stream, flag, '|');) flags.push_back(flag);
+  return flags;
+}
+
+RotationRow ParseRow(const std::filesystem::path& path, const TextRow& text) {
+  const auto number = [&](std::size_t column) { return NumberAt(path, text, column); };
+  RotationRow row;
+  row.frame = static_cast<int>(number(0));
+  row.timestamp_s = number(1);
+  const Eigen::Quaterniond q(number(5), number(2), number(3), number(4));
+  if (!(std::abs(q.norm() - 1.0) < kMaxNormError)) {
+    throw std::runtime_error(AtLine(path, text.line, "the quaternion is not of length 1"));
+  }
+  row.world_from_cam = Rotation(q);
+  if (!text.words[6].empty()) row.sigma_deg.emplace(number(6), number(7), number(8));
+  row.inlier_edges = static_cast<int>(number(9));
+  row.flags = CutAtBars(text.words[10]);
+  return row;
 }
 
 }  // namespace
@@ -43,6 +71,14 @@ void WriteRotationsCsv(const std::filesystem::path& path, const std::vector<Rota
     text += '\n';
   }
   ReplaceFile(path, text);
+}
+
+std::vector<RotationRow> ReadRotationsCsv(const std::filesystem::path& path) {
+  const std::vector<TextRow> texts = ReadCsvRows(path, kNumColumns);
+  std::vector<RotationRow> rows;
+  rows.reserve(texts.size());
+  for (const TextRow& text : texts) rows.push_back(ParseRow(path, text));
+  return rows;
 }
 
 }  // namespace rotslam

@@ -30,4 +30,7 @@ struct RotationRow {
 /// line, std::runtime_error when the file cannot be written; never leaves half a file.
 void WriteRotationsCsv(const std::filesystem::path& path, const std::vector<RotationRow>& rows);
 
+/// Reads what WriteRotationsCsv has written. Throws std::runtime_error with file, line and reason.
+std::vector<RotationRow> ReadRotationsCsv(const std::filesystem::path& path);
+
 }  // namespace rotslam

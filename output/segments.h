@@ -22,4 +22,7 @@ struct Segment {
 /// when the file cannot be written.
 void WriteSegments(const std::filesystem::path& path, const std::vector<Segment>& segments);
 
+/// Reads what WriteSegments has written. Throws std::runtime_error with file, line and reason.
+std::vector<Segment> ReadSegmentsCsv(const std::filesystem::path& path);
+
 }  // namespace rotslam

@@ -25,6 +25,18 @@ std::vector<std::string> SplitWords(std::string_view line) {
   return words;
 }
 
+TextRow CutAtCommas(const std::string& line, int number) {
+  TextRow row{number, {""}};
+  for (const char c : line) {
+    if (c == ',') {
+      row.words.emplace_back();
+    } else if (c != '\r' && c != ' ') {
+      row.words.back() += c;
+    }
+  }
+  return row;
+}
+
 }  // namespace
 
 std::vector<TextRow> ReadTextRows(const std::filesystem::path& path) {
@@ -46,6 +58,27 @@ std::vector<TextRow> ReadTextRows(const std::filesystem::path& path) {
   return rows;
 }
 
+std::vector<TextRow> ReadCsvRows(const std::filesystem::path& path, std::size_t num_columns) {
+  std::error_code error;
+  std::ifstream file(path);
+  if (!file || std::filesystem::is_directory(path, error)) {
+    throw std::runtime_error(path.string() + ": cannot be read");
+  }
+  std::vector<TextRow> rows;
+  std::string line;
+  std::getline(file, line);  // the columns' names
+  for (int number = 2; std::getline(file, line); ++number) {
+    if (line.empty() || line == "\r") continue;
+    rows.push_back(CutAtCommas(line, number));
+    if (rows.back().words.size() == num_columns) continue;
+    throw std::runtime_error(AtLine(path,
+                                    number,
+                                    "expected " + std::to_string(num_columns) + " columns, found " +
+                                        std::to_string(rows.back().words.size())));
+  }
+  return rows;
+}
+
 std::string AtLine(const std::filesystem::path& path, int line, const std::string& reason) {
   return path.string() + ":" + std::to_string(line) + ": " + reason;
 }
@@ -55,7 +88,7 @@ double NumberAt(const std::filesystem::path& path, const TextRow& row, std::size
     throw std::runtime_error(AtLine(path, row.line, "the line ends too early"));
   }
   const std::string& word = row.words[position];
-  const char* begin = word.data() + (word.front() == '+' ? 1 : 0);
+  const char* begin = word.data() + (word.starts_with('+') ? 1 : 0);
   const char* end = word.data() + word.size();
   double value = 0.0;
   const auto [stop, code] = std::from_chars(begin, end, value);

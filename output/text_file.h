@@ -1,5 +1,6 @@
 #pragma once
 
+#include <cstddef>
 #include <filesystem>
 #include <string>
 #include <vector>
@@ -15,6 +16,10 @@ struct TextRow {
 /// The lines of a text file without the empty ones and those that start with '#'.
 /// Throws std::runtime_error naming `path` when it cannot be read.
 std::vector<TextRow> ReadTextRows(const std::filesystem::path& path);
+
+/// The lines of a CSV file below its first one, cut at commas alone: cells may be empty. Throws
+/// std::runtime_error naming `path`, and the line where that has another number of cells.
+std::vector<TextRow> ReadCsvRows(const std::filesystem::path& path, std::size_t num_columns);
 
 /// "path:line: reason", the form in which readers report what is wrong in a file.
 std::string AtLine(const std::filesystem::path& path, int line, const std::string& reason);

@@ -16,13 +16,15 @@ packages=(
   libcli11-dev libpcl-dev libsqlite3-dev nlohmann-json3-dev
   # Python module; numpy also for the independent check of `rotslam eval`
   pybind11-dev python3-dev python3-numpy
+  # the report and the plots
+  libcairo2-dev libjs-three
   # tests; GLPK and OpenGV to compare with
   libglpk-dev libgmock-dev libgtest-dev libopengv-dev
 )
 # Not needed: libbenchmark-dev, for the benchmarks (ROTSLAM_BUILD_BENCHMARKS).
 if [[ ${1:-} == --ci ]]; then
-  # colmap: the tests that hand it our models, which skip without it
-  packages+=(clang-format-14 clang-tidy-14 colmap)
+  # colmap: the tests that hand it our models; chromium: the one that opens the report; they skip without
+  packages+=(clang-format-14 clang-tidy-14 chromium colmap)
 elif [[ $# -gt 0 ]]; then
   echo "usage: ${0##*/} [--ci]" >&2
   exit 2

@@ -35,7 +35,7 @@ class RunCommand : public testing::Test {
                                                "--out=" + Sequence(kind).string()});
       ASSERT_EQ(simulated.exit_code, 0) << simulated.error;
       const CommandResult run =
-          Rotslam({"run", Sequence(kind).string(), "--out=" + Out(kind).string()});
+          Rotslam({"run", Sequence(kind).string(), "--no-report", "--out=" + Out(kind).string()});
       ASSERT_EQ(run.exit_code, 0) << run.error;
     }
   }
@@ -241,7 +241,7 @@ TEST_F(RunCommand, AveragingFlagOverridesTheConfiguration) {
 TEST_P(OnBothSequences, RotationsStopsAfterTheSameOrientations) {
   const TemporaryFolder folder;
   const CommandResult result =
-      Rotslam({"rotations", Sequence().string(), "--out=" + folder.path().string()});
+      Rotslam({"rotations", Sequence().string(), "--no-report", "--out=" + folder.path().string()});
   ASSERT_EQ(result.exit_code, 0) << result.error;
   EXPECT_THAT(
       FileNames(folder.path()),

@@ -30,7 +30,8 @@ class RunVariants : public testing::Test {
                const std::string& name,
                const std::vector<std::string>& more = {}) const {
     const fs::path out = folder_.path() / name;
-    const CommandResult result = Rotslam({"run", sequence.string(), "--out=" + out.string()}, more);
+    const CommandResult result =
+        Rotslam({"run", sequence.string(), "--no-report", "--out=" + out.string()}, more);
     EXPECT_EQ(result.exit_code, 0) << result.error;
     return out;
   }

@@ -72,7 +72,8 @@ class SmallSequenceTest : public testing::Test {
 
   CommandResult Run(const std::filesystem::path& sequence,
                     const std::vector<std::string>& more = {}) const {
-    return Rotslam({"run", sequence.string(), "--out", Out().string(), "--quiet"}, more);
+    return Rotslam({"run", sequence.string(), "--out", Out().string(), "--no-report", "--quiet"},
+                   more);
   }
 
   // The line that a refused command prints, without "rotslam: ". Nothing may be left behind.

@@ -75,5 +75,21 @@ TEST(LoopsCsv, KeepsTheOldFileWhenItCannotWriteTheNew) {
   EXPECT_EQ(std::distance(begin(files), end(files)), 1);
 }
 
+TEST(LoopsCsv, ReadsWhatItHasWritten) {
+  const TemporaryFolder folder;
+  const std::filesystem::path path = folder.path() / "loops.csv";
+  WriteLoopsCsv(path, {{90, 7, 0.5, 123, 1.25, true, 1.002, 0.75}});
+  const std::vector<LoopRow> read = ReadLoopsCsv(path);
+  ASSERT_EQ(read.size(), 1u);
+  EXPECT_EQ(read[0].frame, 90);
+  EXPECT_EQ(read[0].match, 7);
+  EXPECT_EQ(read[0].score, 0.5);
+  EXPECT_EQ(read[0].inliers, 123);
+  EXPECT_EQ(read[0].angle_deg, 1.25);
+  EXPECT_TRUE(read[0].accepted);
+  EXPECT_EQ(read[0].turn_scale, 1.002);
+  EXPECT_EQ(read[0].scaled_angle_deg, 0.75);
+}
+
 }  // namespace
 }  // namespace rotslam

@@ -103,5 +103,35 @@ TEST(RotationsCsv, RefusesWhatWouldNotComeBack) {
                std::runtime_error);
 }
 
+TEST(RotationsCsv, ReadsWhatItHasWritten) {
+  const TemporaryFolder folder;
+  std::vector<RotationRow> rows(2);
+  rows[0].sigma_deg = Eigen::Vector3d(0.1, 0.2, 0.3);
+  rows[1] = {1, 0.25, Rotation::Exp({0.1, -0.2, 0.3}), std::nullopt, 7, {"weak", "loop"}};
+  const std::filesystem::path path = folder.path() / "rotations.csv";
+  WriteRotationsCsv(path, rows);
+  const std::vector<RotationRow> read = ReadRotationsCsv(path);
+  ASSERT_EQ(read.size(), 2u);
+  EXPECT_EQ(read[0].sigma_deg, rows[0].sigma_deg);
+  EXPECT_THAT(read[0].flags, testing::IsEmpty());
+  EXPECT_EQ(read[1].frame, 1);
+  EXPECT_EQ(read[1].timestamp_s, 0.25);
+  EXPECT_LT((read[1].world_from_cam.Inverse() * rows[1].world_from_cam).Angle(), 1e-9);
+  EXPECT_EQ(read[1].sigma_deg, std::nullopt);
+  EXPECT_EQ(read[1].inlier_edges, 7);
+  EXPECT_THAT(read[1].flags, ElementsAre("weak", "loop"));
+}
+
+TEST(RotationsCsv, SaysWhichLineCannotBeRead) {
+  const TemporaryFolder folder;
+  const auto error = [&](const std::string& line) {
+    const auto path = folder.Write("rotations.csv", "names\n" + line + "\n");
+    return RuntimeErrorOf([&] { ReadRotationsCsv(path); });
+  };
+  EXPECT_THAT(error("0,0,0,0,0,1"), testing::HasSubstr("rotations.csv:2: expected 11 columns"));
+  EXPECT_THAT(error("0,0,0,0,0,5,,,,1,"), testing::HasSubstr("not of length 1"));
+  EXPECT_THAT(error("0,,0,0,0,1,,,,1,"), testing::HasSubstr("expected a finite number"));
+}
+
 }  // namespace
 }  // namespace rotslam

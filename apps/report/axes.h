@@ -1,0 +1,44 @@
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include <Eigen/Core>
+
+#include "apps/report/drawing.h"
+
+namespace rotslam {
+
+/// A rectangle of a drawing in which data have their place.
+class Axes {
+ public:
+  struct Box {
+    double left = 0.0;
+    double top = 0.0;
+    double width = 0.0;
+    double height = 0.0;
+  };
+
+  explicit Axes(const Box& box) : box_(box) {}
+
+  /// Widens the range of data to hold this point; NaN leaves a coordinate out.
+  void Include(const Eigen::Vector2d& point);
+  /// A little room around the data; with `equal_scale` a unit is as long in both directions.
+  void Settle(bool equal_scale);
+
+  /// Grid, frame, numbers and names. Without `x_label` the lower numbers are left out, too.
+  void DrawFrame(const std::string& x_label, const std::string& y_label, Drawing& drawing) const;
+  Eigen::Vector2d OnPage(const Eigen::Vector2d& point) const;
+  /// The parts of a line through data points that lie within the axes.
+  void DrawLine(const std::vector<Eigen::Vector2d>& points,
+                const Stroke& stroke,
+                Drawing& drawing) const;
+  bool Contains(const Eigen::Vector2d& point) const;
+
+ private:
+  Box box_;
+  Eigen::Vector2d low_ = Eigen::Vector2d::Constant(1e300);
+  Eigen::Vector2d high_ = Eigen::Vector2d::Constant(-1e300);
+};
+
+}  // namespace rotslam

@@ -1,0 +1,33 @@
+#pragma once
+
+#include <string>
+#include <string_view>
+
+#include <nlohmann/json.hpp>
+
+#include "apps/report/run_data.h"
+#include "apps/report/thumbnails.h"
+
+namespace rotslam {
+
+/// How much of a run goes into its report.
+struct PageLimits {
+  // More points are thinned out evenly over the cloud's order.
+  int max_points = 50000;
+  // More frames, or edges, are thinned out evenly; the page says so.
+  int max_frames = 20000;
+  int max_edges = 100000;
+  int max_features_per_frame = 400;
+};
+
+/// What the page shows, under the names by which its scripts ask for it. Arrays of numbers are
+/// {"type", "columns", "data"} with little-endian numbers in base64; all of them are finite,
+/// unknown standard deviations are -1.
+nlohmann::ordered_json PageData(const RunData& run,
+                                const Thumbnails& thumbnails,
+                                const PageLimits& limits);
+
+/// Binary data as text.
+std::string Base64(std::string_view bytes);
+
+}  // namespace rotslam

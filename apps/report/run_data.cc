@@ -1,0 +1,200 @@
+#include "apps/report/run_data.h"
+
+#include <algorithm>
+#include <cmath>
+#include <memory>
+#include <stdexcept>
+#include <utility>
+
+#include <Eigen/Geometry>
+#include <Eigen/SVD>
+
+#include "apps/run_summary.h"
+#include "output/g2o.h"
+#include "output/trajectory.h"
+#include "rotodom/sequence/sequence.h"
+
+namespace rotslam {
+namespace {
+
+namespace fs = std::filesystem;
+
+// One pose per row of rotations.csv, or none at all.
+Trajectory ReadPoses(const fs::path& path, const std::vector<RotationRow>& rotations) {
+  Trajectory poses = ReadTrajectory(path);
+  if (poses.size() != rotations.size()) {
+    throw std::runtime_error(path.string() + ": has " + std::to_string(poses.size()) +
+                             " poses, rotations.csv beside it " + std::to_string(rotations.size()) +
+                             "; run the sequence again");
+  }
+  return poses;
+}
+
+Trajectory RotationsOnly(const std::vector<RotationRow>& rows) {
+  Trajectory poses;
+  poses.reserve(rows.size());
+  for (const RotationRow& row : rows) {
+    poses.push_back({row.timestamp_s, row.world_from_cam, Eigen::Vector3d::Zero()});
+  }
+  return poses;
+}
+
+// KITTI's poses carry no times: those that lie beside them, else the numbers of the frames.
+Trajectory ReadTruth(const TruthSource& source, const fs::path& file) {
+  if (!source.times.empty()) return ReadTrajectory(file, source.times);
+  const fs::path beside = file.parent_path() / "times.txt";
+  return fs::exists(beside) ? ReadTrajectory(file, beside) : ReadTrajectory(file);
+}
+
+// The place of each pair's estimate among the frames; both ascend in time.
+std::vector<int> PlacesOf(const std::vector<PosePair>& pairs, const Trajectory& estimate) {
+  std::vector<int> places;
+  places.reserve(pairs.size());
+  int place = 0;
+  for (const PosePair& pair : pairs) {
+    while (estimate[place].timestamp_s != pair.estimate.timestamp_s) ++place;
+    places.push_back(place++);
+  }
+  return places;
+}
+
+void AddPositionsOfTruth(const std::vector<PosePair>& pairs, TruthData& truth) {
+  if (!truth.trajectory || !truth.trajectory->scale) return;
+  const auto num_pairs = static_cast<Eigen::Index>(pairs.size());
+  Eigen::Matrix3Xd estimate(3, num_pairs);
+  Eigen::Matrix3Xd actual(3, num_pairs);
+  for (Eigen::Index k = 0; k < num_pairs; ++k) {
+    estimate.col(k) = pairs[k].estimate.center_in_world;
+    actual.col(k) = pairs[k].ground_truth.center_in_world;
+  }
+  const Eigen::Matrix4d truth_from_estimate = Eigen::umeyama(estimate, actual, true);
+  const Eigen::Matrix4d estimate_from_truth = truth_from_estimate.inverse();
+  for (Eigen::Index k = 0; k < num_pairs; ++k) {
+    const Eigen::Vector3d moved = (truth_from_estimate * estimate.col(k).homogeneous()).head<3>();
+    truth.position_error_m.push_back((moved - actual.col(k)).norm());
+    truth.center_in_world.emplace_back(
+        (estimate_from_truth * actual.col(k).homogeneous()).head<3>());
+  }
+}
+
+// The rotation between the two worlds with the least sum of squared chordal distances.
+Rotation BestTurn(const std::vector<PosePair>& pairs) {
+  Eigen::Matrix3d sum = Eigen::Matrix3d::Zero();
+  for (const PosePair& pair : pairs) {
+    sum += pair.estimate.world_from_cam.Matrix() *
+           pair.ground_truth.world_from_cam.Matrix().transpose();
+  }
+  const Eigen::JacobiSVD<Eigen::Matrix3d> svd(sum, Eigen::ComputeFullU | Eigen::ComputeFullV);
+  Eigen::Matrix3d sign = Eigen::Matrix3d::Identity();
+  sign(2, 2) = (svd.matrixU() * svd.matrixV().transpose()).determinant() < 0.0 ? -1.0 : 1.0;
+  return Rotation::FromMatrix(svd.matrixU() * sign * svd.matrixV().transpose());
+}
+
+TruthData CompareWith(const Trajectory& ground_truth,
+                      const std::string& file,
+                      const MetricsOptions& options,
+                      const RunData& run) {
+  const Trajectory orientations = RotationsOnly(run.rotations);
+  const std::vector<PosePair> pairs = AssociatePoses(ground_truth, orientations, options);
+  if (pairs.size() < 3) {
+    throw std::runtime_error(file + ": only " + std::to_string(pairs.size()) +
+                             " frames have ground truth in it: do the timestamps agree?");
+  }
+  TruthData truth;
+  truth.file = file;
+  truth.rotations = ComputeMetrics(pairs, options);
+  truth.frames = PlacesOf(pairs, orientations);
+  const Rotation estimate_from_truth = BestTurn(pairs);
+  truth.world_from_cam.reserve(pairs.size());
+  for (const PosePair& pair : pairs) {
+    truth.world_from_cam.push_back(estimate_from_truth * pair.ground_truth.world_from_cam);
+  }
+  if (run.poses.empty()) return truth;
+  const std::vector<PosePair> pose_pairs = AssociatePoses(ground_truth, run.poses, options);
+  if (pose_pairs.size() != pairs.size()) return truth;
+  truth.trajectory = ComputeMetrics(pose_pairs, options);
+  AddPositionsOfTruth(pose_pairs, truth);
+  return truth;
+}
+
+std::optional<fs::path> TruthBesideImages(const RunData& run) {
+  const auto sequence = run.summary.at("sequence");
+  if (!sequence.contains("path") || !fs::exists(sequence.at("path").get<std::string>())) {
+    return std::nullopt;
+  }
+  return OpenSequence(sequence.at("path").get<std::string>(), SequenceOptionsOf(run.summary))
+      ->GroundTruthFile();
+}
+
+}  // namespace
+
+bool RunData::HasPositions() const {
+  for (const StampedPose& pose : poses) {
+    if (pose.center_in_world != poses.front().center_in_world) return true;
+  }
+  return false;
+}
+
+RunData ReadRunData(const fs::path& run) {
+  RunData data;
+  data.directory = run;
+  data.summary = ReadSummaryOf(run);
+  data.rotations = ReadRotationsCsv(run / "rotations.csv");
+  if (data.rotations.empty()) {
+    throw std::runtime_error((run / "rotations.csv").string() +
+                             ": has no frames; run the sequence again");
+  }
+  const auto is_there = [&](const char* name) { return fs::exists(run / name); };
+  if (is_there("loops.csv")) data.loops = ReadLoopsCsv(run / "loops.csv");
+  if (is_there("view_graph.g2o")) data.edges = ReadG2o(run / "view_graph.g2o").graph.edges();
+  // Whatever else lies there is then of an older run.
+  if (data.summary.value("command", "") == "rotations" ||
+      data.summary.value("interrupted", false)) {
+    return data;
+  }
+  if (is_there("trajectory_tum.txt")) {
+    data.poses = ReadPoses(run / "trajectory_tum.txt", data.rotations);
+  }
+  if (is_there("segments.csv")) data.segments = ReadSegmentsCsv(run / "segments.csv");
+  if (is_there("map.bin")) data.keyframe_map = ReadRunMap(run / "map.bin");
+  if (is_there("map_all_frames.bin")) data.cloud = ReadRunMap(run / "map_all_frames.bin");
+  return data;
+}
+
+void AddTruth(const TruthSource& source, const MetricsOptions& options, RunData& run) {
+  if (!source.file.empty()) {
+    run.truth = CompareWith(ReadTruth(source, source.file), source.file, options, run);
+    return;
+  }
+  try {
+    const std::optional<fs::path> file = TruthBesideImages(run);
+    if (file) run.truth = CompareWith(ReadTruth(source, *file), file->string(), options, run);
+  } catch (const std::exception& error) {
+    run.truth_problem = error.what();
+  }
+}
+
+std::vector<Eigen::Vector3d> RollPitchYawDeg(const std::vector<Rotation>& world_from_cam) {
+  std::vector<Eigen::Vector3d> angles_deg;
+  angles_deg.reserve(world_from_cam.size());
+  for (const Rotation& rotation : world_from_cam) {
+    const Eigen::Matrix3d R_w_c = rotation.Matrix();
+    Eigen::Vector3d angle_deg =
+        kDegFromRad * Eigen::Vector3d(std::atan2(R_w_c(1, 0), R_w_c(1, 1)),
+                                      std::asin(std::clamp(-R_w_c(1, 2), -1.0, 1.0)),
+                                      std::atan2(R_w_c(0, 2), R_w_c(2, 2)));
+    if (!angles_deg.empty()) {
+      for (int axis = 0; axis < 3; ++axis) {
+        angle_deg[axis] -= 360.0 * std::round((angle_deg[axis] - angles_deg.back()[axis]) / 360.0);
+      }
+    }
+    angles_deg.push_back(angle_deg);
+  }
+  return angles_deg;
+}
+
+Eigen::Vector3d ErrorDeg(const Rotation& world_from_cam, const Rotation& true_world_from_cam) {
+  return kDegFromRad * (true_world_from_cam.Inverse() * world_from_cam).Log();
+}
+
+}  // namespace rotslam

@@ -1,0 +1,83 @@
+#pragma once
+
+#include <filesystem>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include <Eigen/Core>
+#include <nlohmann/json.hpp>
+
+#include "output/loops_csv.h"
+#include "output/metrics.h"
+#include "output/rotations_csv.h"
+#include "output/run_map.h"
+#include "output/segments.h"
+#include "rotodom/types/trajectory.h"
+#include "rotodom/types/view_graph.h"
+
+namespace rotslam {
+
+/// Ground truth at the times of a run's frames, moved into the run's world.
+struct TruthData {
+  std::string file;
+  // Of rotations_tum.txt and, where there are positions, of trajectory_tum.txt: the figures of
+  // `rotslam eval`.
+  TrajectoryMetrics rotations;
+  std::optional<TrajectoryMetrics> trajectory;
+  std::vector<int> frames;  // that have ground truth, by their place in RunData::rotations
+  // One per entry of `frames`; all turned by the one rotation that fits best.
+  std::vector<Rotation> world_from_cam;
+  // After the similarity that fits best; empty without positions. The error is in the ground
+  // truth's unit.
+  std::vector<Eigen::Vector3d> center_in_world;
+  std::vector<double> position_error_m;
+};
+
+/// Everything that a run has left in its folder, as far as it is there.
+// The check suspects the move of the JSON library, which is noexcept.
+// NOLINTNEXTLINE(bugprone-exception-escape)
+struct RunData {
+  std::filesystem::path directory;
+  nlohmann::ordered_json summary;       // summary.json
+  std::vector<RotationRow> rotations;   // rotations.csv, one per frame
+  Trajectory poses;                     // trajectory_tum.txt, one per frame; empty without
+  std::vector<Segment> segments;        // segments.csv
+  std::vector<LoopRow> loops;           // loops.csv
+  std::vector<RelativeRotation> edges;  // view_graph.g2o
+  std::optional<RunMap> keyframe_map;   // map.bin
+  std::optional<RunMap> cloud;          // map_all_frames.bin
+  std::optional<TruthData> truth;
+  std::string truth_problem;  // why the ground truth beside the images was of no use
+
+  int NumFrames() const { return static_cast<int>(rotations.size()); }
+  /// Whether the camera has moved from its place.
+  bool HasPositions() const;
+};
+
+/// Reads the folder of `run` or `rotations`. Throws std::runtime_error with path and reason where
+/// summary.json or rotations.csv is missing, or any file is damaged.
+RunData ReadRunData(const std::filesystem::path& run);
+
+/// Which ground truth to compare with.
+struct TruthSource {
+  std::string file;   // empty: what lies with the images, if anything does
+  std::string times;  // of a KITTI file; empty: the `times.txt` beside it
+};
+
+/// Sets `run.truth`. Throws std::runtime_error where a file that was asked for cannot be used; of
+/// one that only lies with the images, `truth_problem` says so.
+void AddTruth(const TruthSource& source, const MetricsOptions& options, RunData& run);
+
+/// Yaw, pitch and roll of a camera against the world: world_from_cam = Ry(yaw) Rx(pitch) Rz(roll).
+/// Seen by the camera's axes (x right, y down, z forward) yaw turns right, pitch up, roll
+/// clockwise.
+/// @return  roll, pitch, yaw of each orientation in degrees, each as close as turns of 360 deg
+/// allow
+///          to the one before.
+std::vector<Eigen::Vector3d> RollPitchYawDeg(const std::vector<Rotation>& world_from_cam);
+
+/// What is left between two orientations of a camera, as a rotation vector about its own axes, deg.
+Eigen::Vector3d ErrorDeg(const Rotation& world_from_cam, const Rotation& true_world_from_cam);
+
+}  // namespace rotslam

@@ -1,0 +1,19 @@
+#pragma once
+
+#include <filesystem>
+
+#include "apps/command.h"
+#include "apps/progress.h"
+
+namespace rotslam {
+
+/// Writes report.html into the folder of a run that has just ended. A report that fails is a
+/// warning: the run's results are there.
+void WriteReportOfRun(const std::filesystem::path& directory,
+                      const CommonFlags& flags,
+                      Progress& progress);
+
+/// `run` and `rotations` write one; `--no-report` leaves it out.
+void AddReportFlag(CLI::App& command, bool& use_report);
+
+}  // namespace rotslam
