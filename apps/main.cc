@@ -1,5 +1,3 @@
-#include <algorithm>
-#include <cstdio>
 #include <cstdlib>
 #include <exception>
 #include <string>
@@ -8,16 +6,10 @@
 #include <opencv2/core/utility.hpp>
 
 #include "apps/command.h"
+#include "apps/progress.h"
 
 namespace rotslam {
 namespace {
-
-// Messages of other libraries may have several lines; ours have one.
-void PrintError(std::string message) {
-  while (!message.empty() && message.back() == '\n') message.pop_back();
-  std::replace(message.begin(), message.end(), '\n', ' ');
-  std::fprintf(stderr, "rotslam: %s\n", message.c_str());
-}
 
 // The line is not one of ours: says what is wrong with it and where to read what it may be.
 int RefuseCommandLine(const CLI::App& app, const CLI::ParseError& error, int argc, char** argv) {

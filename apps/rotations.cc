@@ -20,7 +20,7 @@ struct RotationsFlags {
 
 int FindAndWriteRotations(const RotationsFlags& flags) {
   const auto start = std::chrono::steady_clock::now();
-  Progress progress(flags.common.quiet);
+  Progress progress(flags.common);
   // The whole pipeline's options, so that one configuration file serves `run` and `rotations`.
   PipelineOptions options = ReadPipelineOptions(flags.common, flags.input);
   if (!flags.averaging.empty()) options.rotodom.averaging.mode = flags.averaging;

@@ -30,7 +30,7 @@ double SecondsSince(Clock::time_point start) {
 
 int Run(const RunFlags& flags) {
   const Clock::time_point start = Clock::now();
-  Progress progress(flags.common.quiet);
+  Progress progress(flags.common);
   PipelineOptions options = ReadPipelineOptions(flags.common, flags.input);
   flags.krot.Override(options.krot);
 

@@ -140,7 +140,7 @@ int Train(VocabularyFlags flags) {
   if (images.size() < 2) {
     throw std::invalid_argument("vocabulary train: one image is not enough; name at least two");
   }
-  Progress progress(flags.common.quiet);
+  Progress progress(flags.common);
   const auto descriptors = DescribeImages(images, flags, progress);
   progress.StartStage("clustering", flags.training.depth);
   const Vocabulary vocabulary =

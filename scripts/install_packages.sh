@@ -13,7 +13,7 @@ packages=(
   # krot and ba
   coinor-libclp-dev libceres-dev libgoogle-glog-dev
   # output and apps
-  libcli11-dev libpcl-dev libsqlite3-dev nlohmann-json3-dev
+  libcli11-dev libexif-dev libpcl-dev libspdlog-dev libsqlite3-dev nlohmann-json3-dev
   # tests; GLPK and OpenGV to compare with, numpy for the independent check of `rotslam eval`
   libglpk-dev libgmock-dev libgtest-dev libopengv-dev python3-numpy
 )
