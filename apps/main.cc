@@ -6,6 +6,7 @@
 #include <opencv2/core/utility.hpp>
 
 #include "apps/command.h"
+#include "apps/interruption.h"
 #include "apps/progress.h"
 
 namespace rotslam {
@@ -62,6 +63,9 @@ int main(int argc, char** argv) {
       return rotslam::RefuseCommandLine(app, error, argc, argv);
     }
     return action();
+  } catch (const rotslam::InterruptedError& error) {
+    rotslam::PrintError(error.what());
+    return rotslam::Interruption::kExitCode;
   } catch (const std::exception& error) {
     rotslam::PrintError(error.what());
     return 1;

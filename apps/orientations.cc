@@ -138,6 +138,7 @@ Orientations FindOrientations(Input& input,
                               std::shared_ptr<const Vocabulary> vocabulary,
                               bool keep_features,
                               const CommonFlags& flags,
+                              const Interruption& interruption,
                               Progress& progress) {
   LoopedOdometry odometry(input.camera,
                           options.rotodom,
@@ -164,6 +165,11 @@ Orientations FindOrientations(Input& input,
     progress.Step(frame->id.value + 1, counters.Update(estimate, odometry.result()));
     orientations.loops.insert(
         orientations.loops.end(), estimate.loops.begin(), estimate.loops.end());
+    orientations.interrupted = interruption.IsRequested();
+    if (orientations.interrupted) {
+      progress.Say("interrupted: putting together what there is; once more ends at once");
+      break;
+    }
   }
   const std::vector<LoopCheck> last_loops = odometry.Finish();
   orientations.loops.insert(orientations.loops.end(), last_loops.begin(), last_loops.end());
@@ -174,6 +180,10 @@ Orientations FindOrientations(Input& input,
   static_cast<OdometryResult&>(orientations) = odometry.TakeResult();
 
   const int num_frames = static_cast<int>(orientations.timestamps_s.size());
+  if (orientations.interrupted && (num_frames < 3 || orientations.graph.edges().empty())) {
+    throw InterruptedError("interrupted after frame " + std::to_string(num_frames - 1) +
+                           ": too early, nothing is written");
+  }
   if (num_frames < 3) {
     throw std::runtime_error("only " + std::to_string(num_frames) +
                              " frames could be read; at least 3 are needed");

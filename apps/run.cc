@@ -4,6 +4,7 @@
 #include <utility>
 
 #include "apps/command.h"
+#include "apps/interruption.h"
 #include "apps/orientations.h"
 #include "apps/pipeline.h"
 #include "apps/positions.h"
@@ -30,6 +31,7 @@ double SecondsSince(Clock::time_point start) {
 
 int Run(const RunFlags& flags) {
   const Clock::time_point start = Clock::now();
+  Interruption interruption;
   Progress progress(flags.common);
   PipelineOptions options = ReadPipelineOptions(flags.common, flags.input);
   flags.krot.Override(options.krot);
@@ -38,13 +40,27 @@ int Run(const RunFlags& flags) {
       flags.input, options.sequence, [&](const std::string& line) { progress.Say(line); });
   auto vocabulary = OpenVocabulary(flags.input);
   const std::filesystem::path directory = PrepareRunDirectory(flags.input.out);
-  const Orientations orientations =
-      FindOrientations(input, options, std::move(vocabulary), true, flags.common, progress);
+  const Orientations orientations = FindOrientations(
+      input, options, std::move(vocabulary), true, flags.common, interruption, progress);
   WriteOrientations(directory, orientations);
   const double orientations_s = SecondsSince(start);
+  const auto end_early = [&] {
+    RunSummary summary = StartSummary("run", input, orientations, DescribeOptions(options));
+    summary.interrupted = true;
+    summary.seconds.push_back({"orientations", orientations_s});
+    summary.seconds.push_back({"total", SecondsSince(start)});
+    WriteSummary(directory / "summary.json", summary);
+    progress.Warn(DescribeInterrupted(directory, orientations));
+  };
+  if (orientations.interrupted) {
+    end_early();
+    return Interruption::kExitCode;
+  }
 
-  const PositionResult positions =
-      FindPositions(orientations, input.camera, options, flags.common.NumThreads(), progress);
+  const PositionResult positions = [&] {
+    const LastWords last_words(interruption, end_early);
+    return FindPositions(orientations, input.camera, options, flags.common.NumThreads(), progress);
+  }();
   const double positions_s = SecondsSince(start) - orientations_s;
   WritePositions(directory,
                  orientations,
@@ -75,7 +91,9 @@ int Run(const RunFlags& flags) {
                "rotations_tum.txt, rotations.csv, loops.csv, cloud.ply, cameras.ply, segments.csv, "
                "view_graph.g2o, "
                "known_rotation.txt, map.bin, map_all_frames.bin, summary.json");
-  if (positions.failure.empty()) return 0;
+  if (positions.failure.empty()) {
+    return interruption.IsRequested() ? Interruption::kExitCode : 0;
+  }
   throw std::runtime_error("orientations are in " + directory.string() +
                            ", positions are not: " + positions.failure);
 }

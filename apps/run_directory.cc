@@ -224,12 +224,20 @@ void WriteMaps(const std::filesystem::path& directory,
   WriteRunMap(directory / "map_all_frames.bin", map);
 }
 
+std::string DescribeInterrupted(const std::filesystem::path& directory,
+                                const Orientations& orientations) {
+  return "interrupted after " + std::to_string(orientations.timestamps_s.size()) +
+         " frames; their orientations are in " + directory.string() +
+         ": rotations_tum.txt, rotations.csv, loops.csv, view_graph.g2o, summary.json";
+}
+
 RunSummary StartSummary(const std::string& command,
                         const Input& input,
                         const Orientations& orientations,
                         std::vector<OptionEntry> options) {
   RunSummary summary;
   summary.command = command;
+  summary.interrupted = orientations.interrupted;
   summary.options = std::move(options);
   summary.camera = input.camera;
   const auto count = [](std::size_t value) { return static_cast<std::int64_t>(value); };
