@@ -8,6 +8,7 @@
 #include "apps/command.h"
 #include "apps/interruption.h"
 #include "apps/progress.h"
+#include "apps/versions.h"
 
 namespace rotslam {
 namespace {
@@ -55,6 +56,10 @@ int main(int argc, char** argv) {
     rotslam::AddSimulateCommand(app, action);
     rotslam::AddPanoramaCommand(app, action);
     rotslam::AddVocabularyCommand(app, action);
+    rotslam::AddCalibrateCommand(app, action);
+    rotslam::AddCompletionCommand(app, action);
+    rotslam::AddManCommand(app, action);
+    app.set_version_flag("--version", rotslam::VersionText(), "Print versions and end");
     try {
       app.parse(argc, argv);
     } catch (const CLI::Success& help) {

@@ -4,6 +4,7 @@
 #include <utility>
 
 #include "apps/command.h"
+#include "apps/focal_guess.h"
 #include "apps/interruption.h"
 #include "apps/orientations.h"
 #include "apps/pipeline.h"
@@ -31,6 +32,7 @@ int FindAndWriteRotations(const RotationsFlags& flags) {
       flags.input, options.sequence, [&](const std::string& line) { progress.Say(line); });
   auto vocabulary = OpenVocabulary(flags.input);
   const std::filesystem::path directory = PrepareRunDirectory(flags.input.out);
+  RefineGuess(flags.input, flags.common, options, interruption, progress, input);
   const Orientations orientations = FindOrientations(
       input, options, std::move(vocabulary), false, flags.common, interruption, progress);
   WriteOrientations(directory, orientations);
@@ -38,6 +40,7 @@ int FindAndWriteRotations(const RotationsFlags& flags) {
   summary.seconds.push_back(
       {"total", std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count()});
   WriteSummary(directory / "summary.json", summary);
+  if (input.guess) progress.Warn(WarningOf(*input.guess, input.camera));
   if (orientations.interrupted) {
     progress.Warn(DescribeInterrupted(directory, orientations));
     return Interruption::kExitCode;

@@ -4,6 +4,7 @@
 #include <utility>
 
 #include "apps/command.h"
+#include "apps/focal_guess.h"
 #include "apps/interruption.h"
 #include "apps/orientations.h"
 #include "apps/pipeline.h"
@@ -40,6 +41,8 @@ int Run(const RunFlags& flags) {
       flags.input, options.sequence, [&](const std::string& line) { progress.Say(line); });
   auto vocabulary = OpenVocabulary(flags.input);
   const std::filesystem::path directory = PrepareRunDirectory(flags.input.out);
+  RefineGuess(flags.input, flags.common, options, interruption, progress, input);
+  if (input.guess) FreeFocal(options.ba.lens);
   const Orientations orientations = FindOrientations(
       input, options, std::move(vocabulary), true, flags.common, interruption, progress);
   WriteOrientations(directory, orientations);
@@ -72,6 +75,7 @@ int Run(const RunFlags& flags) {
 
   RunSummary summary = StartSummary("run", input, orientations, DescribeOptions(options));
   AddPositions(positions, input.camera, summary);
+  if (input.guess) summary.calibration = SummaryOf(*input.guess, positions.camera);
   summary.seconds.push_back({"orientations", orientations_s});
   summary.seconds.push_back({"positions", positions_s});
   summary.seconds.push_back({"total", SecondsSince(start)});
@@ -82,6 +86,7 @@ int Run(const RunFlags& flags) {
                   std::to_string(positions.components[k].keyframes.begin()->value) +
                   " on to the part before; it is set so that the speed is continuous");
   }
+  if (input.guess) progress.Warn(WarningOf(*input.guess, positions.camera));
   if (positions.is_held_throughout) {
     progress.Warn(
         "the camera never leaves its place, so there are no positions and no points to find");

@@ -7,6 +7,7 @@
 #include <stdexcept>
 #include <system_error>
 
+#include "apps/focal_guess.h"
 #include "output/atomic_file.h"
 #include "output/g2o.h"
 #include "output/known_rotation_file.h"
@@ -240,6 +241,7 @@ RunSummary StartSummary(const std::string& command,
   summary.interrupted = orientations.interrupted;
   summary.options = std::move(options);
   summary.camera = input.camera;
+  if (input.guess) summary.calibration = SummaryOf(*input.guess, input.camera);
   const auto count = [](std::size_t value) { return static_cast<std::int64_t>(value); };
   summary.sequence = {{"description", input.sequence->Describe()},
                       {"path", input.path},

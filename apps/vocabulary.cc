@@ -229,11 +229,13 @@ void AddVocabularyCommand(CLI::App& app, Action& action) {
   CLI::App* command = app.add_subcommand(
       "vocabulary", "Visual words, by which places are recognised: train, look at, convert");
   command->require_subcommand(1);
+  command->footer("Example: rotslam vocabulary train footage/ --out mine.rotvoc");
   AddTrainCommand(*command, flags, action);
 
   CLI::App* info = command->add_subcommand("info", "What a vocabulary file holds");
   info->add_option("file", flags->in, "Vocabulary file; default: the one in this program");
   AddCommonFlags(*info, flags->common);
+  info->footer("Example: rotslam vocabulary info ORBvoc.txt");
   info->callback([flags, &action] { action = [flags] { return PrintInfo(*flags); }; });
 
   CLI::App* convert = command->add_subcommand("convert", "From text to binary or back");
