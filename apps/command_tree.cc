@@ -64,10 +64,9 @@ void WriteBashCases(const CommandDescription& command,
   for (const OptionDescription& option : command.options) {
     options.insert(options.end(), option.names.begin(), option.names.end());
     if (!option.takes_value) continue;
-    for (const std::string& name : option.names) {
-      values += "    '" + path + " " + name + "') values='" + Joined(option.choices, " ") +
-                "'; takes_value=1 ;;\n";
-    }
+    const std::string start = "    '" + path + " ";
+    const std::string end = "') values='" + Joined(option.choices, " ") + "'; takes_value=1 ;;\n";
+    for (const std::string& name : option.names) values.append(start).append(name).append(end);
   }
   words += "    '" + path + "') options='" + Joined(options, " ") + "'; words='" +
            Joined(others, " ") + "' ;;\n";
