@@ -41,6 +41,7 @@ void AddCommonFlags(CLI::App& command, CommonFlags& flags) {
   command.add_option("--config", flags.config, "YAML file that overrides option defaults");
   command.add_flag("--quiet", flags.quiet, "Print errors only");
   command.add_flag("--verbose", flags.verbose, "Print details");
+  command.add_option("--log", flags.log, "File for all that --verbose says, with times");
 }
 
 }  // namespace rotslam

@@ -15,6 +15,7 @@ struct CommonFlags {
   std::string config;  // YAML file that overrides option defaults; empty: none
   bool quiet = false;
   bool verbose = false;
+  std::string log;  // file for all that --verbose says, with times; empty: none
 
   /// `threads`, with 0 replaced by the number of cores.
   int NumThreads() const;
@@ -43,5 +44,8 @@ void AddPanoramaCommand(CLI::App& app, Action& action);
 void AddReportCommand(CLI::App& app, Action& action);
 void AddPlotCommand(CLI::App& app, Action& action);
 void AddVocabularyCommand(CLI::App& app, Action& action);
+void AddCalibrateCommand(CLI::App& app, Action& action);
+void AddCompletionCommand(CLI::App& app, Action& action);
+void AddManCommand(CLI::App& app, Action& action);
 
 }  // namespace rotslam

@@ -92,6 +92,7 @@ void AddEvalCommand(CLI::App& app, Action& action) {
       ->check(AtLeastZero());
   command->add_flag("--json", flags->json, "Print one line of JSON");
   AddCommonFlags(*command, flags->common);
+  command->footer("Example: rotslam eval groundtruth.txt runs/mine/trajectory_tum.txt");
   command->callback([flags, &action] { action = [flags] { return Eval(*flags); }; });
 }
 

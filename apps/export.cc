@@ -163,7 +163,7 @@ void MakeParent(const fs::path& out) {
 }
 
 int Export(const ExportFlags& flags) {
-  Progress progress(flags.common.quiet);
+  Progress progress(flags.common);
   const Format& format = Formats().at(flags.format);
   if (flags.all_frames && flags.keyframes) {
     throw std::runtime_error("--all-frames and --keyframes exclude each other");

@@ -3,6 +3,7 @@
 #include <filesystem>
 #include <stdexcept>
 
+#include "apps/focal_guess.h"
 #include "rotodom/camera/read_camera.h"
 #include "rotodom/loop/vocabulary_file.h"
 
@@ -30,6 +31,12 @@ void AddInputFlags(CLI::App& command, InputFlags& flags) {
       flags.camera,
       "Calibration: our YAML, ORB-SLAM, Kalibr, KITTI, EuRoC or COLMAP; not needed where "
       "it lies with the images");
+  command
+      .add_flag("--focal-guess",
+                flags.focal_guess,
+                "Do without a calibration: focal length from EXIF data or 1.2 x the longer side, "
+                "refined in a first pass over the beginning; less accurate")
+      ->excludes("--camera");
   command.add_option("--out", flags.out, "Folder for the results, made if it is not there")
       ->required();
   command.add_option("--first", flags.first, "First input frame to use");
@@ -50,20 +57,20 @@ std::shared_ptr<const Vocabulary> OpenVocabulary(const InputFlags& flags) {
   return std::make_shared<const Vocabulary>(ReadVocabulary(flags.vocabulary));
 }
 
-Input OpenInput(const InputFlags& flags,
-                const SequenceOptions& options,
-                const std::function<void(const std::string&)>& tell) {
-  Input input;
-  input.path = std::filesystem::absolute(flags.sequence).lexically_normal().string();
-  input.sequence = OpenSequence(flags.sequence, options);
-  tell("input:  " + input.sequence->Describe());
+namespace {
+
+// From --camera, else from what lies with the images.
+void ReadCalibration(const InputFlags& flags, Input& input) {
   if (!flags.camera.empty()) {
     input.camera_file = flags.camera;
   } else if (const auto& file = input.sequence->CameraFile()) {
     input.camera_file = file->string();
   } else {
-    throw std::runtime_error(flags.sequence +
-                             ": no calibration lies with the images; give one with --camera FILE");
+    throw std::runtime_error(
+        flags.sequence +
+        ": no calibration lies with the images; give one with --camera FILE (film a printed "
+        "checkerboard and let `rotslam calibrate` make it), or have one guessed with "
+        "--focal-guess");
   }
   const Camera camera = ReadCamera(input.camera_file);
   try {
@@ -71,11 +78,30 @@ Input OpenInput(const InputFlags& flags,
   } catch (const std::runtime_error& error) {
     throw std::runtime_error(input.camera_file + ": " + error.what());
   }
+}
+
+}  // namespace
+
+Input OpenInput(const InputFlags& flags,
+                const SequenceOptions& options,
+                const std::function<void(const std::string&)>& tell) {
+  Input input;
+  input.path = std::filesystem::absolute(flags.sequence).lexically_normal().string();
+  input.sequence = OpenSequence(flags.sequence, options);
+  tell("input:  " + input.sequence->Describe());
+  if (flags.focal_guess) {
+    const cv::Size size = input.sequence->image_size();
+    input.guess = GuessFocal(flags.sequence, options, size);
+    input.camera = CameraOf(*input.guess, size);
+  } else {
+    ReadCalibration(flags, input);
+  }
   if (!flags.rotations.empty()) {
     input.given_rotations = ReadOrientations(flags.rotations);
     input.rotations_file = flags.rotations;
   }
-  tell("camera: " + Describe(input.camera) + " (" + input.camera_file + ")");
+  tell("camera: " + Describe(input.camera) + " (" + (input.guess ? "guessed" : input.camera_file) +
+       ")");
   if (input.sequence->NumFrames() >= 0 && input.sequence->NumFrames() < 3) {
     throw std::runtime_error(flags.sequence + ": " + std::to_string(input.sequence->NumFrames()) +
                              " frames after --first, --last and --stride; at least 3 are needed");

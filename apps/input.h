@@ -17,6 +17,7 @@ namespace rotslam {
 struct InputFlags {
   std::string sequence;
   std::string camera;
+  bool focal_guess = false;  // do without a calibration
   std::string out;
   // Set: override the configuration.
   std::optional<int> first;
@@ -33,11 +34,19 @@ struct InputFlags {
 
 void AddInputFlags(CLI::App& command, InputFlags& flags);
 
+/// A focal length that no calibration gives.
+struct FocalGuess {
+  std::string source;     // "focal_guess_exif" or "focal_guess_width"
+  double guess_px = 0.0;  // at first
+  double focal_px = 0.0;  // what is worked with
+};
+
 struct Input {
   std::string path;  // of the sequence, absolute
   std::unique_ptr<Sequence> sequence;
   Camera camera;  // with the size of the images
   std::string camera_file;
+  std::optional<FocalGuess> guess;  // set: there is no camera_file
   // Orientations from elsewhere, and their file.
   std::optional<std::vector<StampedRotation>> given_rotations;
   std::string rotations_file;
@@ -47,9 +56,9 @@ struct Input {
 /// one clear line.
 std::shared_ptr<const Vocabulary> OpenVocabulary(const InputFlags& flags);
 
-/// Opens the sequence, reads its camera (`flags.camera`, else what lies with the images) and says
-/// what was understood through `tell`; reads `flags.rotations`, too. Throws std::runtime_error with
-/// one clear line.
+/// Opens the sequence, reads its camera (`flags.camera`, else what lies with the images; or guesses
+/// it where `flags.focal_guess`) and says what was understood through `tell`; reads
+/// `flags.rotations`, too. Throws std::runtime_error with one clear line.
 Input OpenInput(const InputFlags& flags,
                 const SequenceOptions& options,
                 const std::function<void(const std::string&)>& tell);

@@ -1,5 +1,3 @@
-#include <algorithm>
-#include <cstdio>
 #include <cstdlib>
 #include <exception>
 #include <string>
@@ -8,16 +6,12 @@
 #include <opencv2/core/utility.hpp>
 
 #include "apps/command.h"
+#include "apps/interruption.h"
+#include "apps/progress.h"
+#include "apps/versions.h"
 
 namespace rotslam {
 namespace {
-
-// Messages of other libraries may have several lines; ours have one.
-void PrintError(std::string message) {
-  while (!message.empty() && message.back() == '\n') message.pop_back();
-  std::replace(message.begin(), message.end(), '\n', ' ');
-  std::fprintf(stderr, "rotslam: %s\n", message.c_str());
-}
 
 // The line is not one of ours: says what is wrong with it and where to read what it may be.
 int RefuseCommandLine(const CLI::App& app, const CLI::ParseError& error, int argc, char** argv) {
@@ -65,6 +59,10 @@ int main(int argc, char** argv) {
     rotslam::AddPanoramaCommand(app, action);
     rotslam::AddVocabularyCommand(app, action);
     rotslam::AddBatchCommand(app, action);
+    rotslam::AddCalibrateCommand(app, action);
+    rotslam::AddCompletionCommand(app, action);
+    rotslam::AddManCommand(app, action);
+    app.set_version_flag("--version", rotslam::VersionText(), "Print versions and end");
     try {
       app.parse(argc, argv);
     } catch (const CLI::Success& help) {
@@ -73,6 +71,9 @@ int main(int argc, char** argv) {
       return rotslam::RefuseCommandLine(app, error, argc, argv);
     }
     return action();
+  } catch (const rotslam::InterruptedError& error) {
+    rotslam::PrintError(error.what());
+    return rotslam::Interruption::kExitCode;
   } catch (const std::exception& error) {
     rotslam::PrintError(error.what());
     return 1;

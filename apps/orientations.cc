@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <cstdint>
 #include <cstdio>
 #include <iterator>
 #include <stdexcept>
@@ -73,6 +74,63 @@ void WarnOfTurnScale(const std::vector<LoopCheck>& loops, Progress& progress) {
   progress.Warn(text.data());
 }
 
+// What runs past while the sequence is read.
+class LiveCounters {
+ public:
+  explicit LiveCounters(const HeldStretchOptions& held) : held_(held) {}
+
+  std::vector<std::string> Update(const LoopedEstimate& estimate, const OdometryResult& result) {
+    num_loops_ += std::count_if(estimate.loops.begin(),
+                                estimate.loops.end(),
+                                [](const LoopCheck& check) { return check.accepted; });
+    // Looking for them takes time in proportion to what has been read.
+    constexpr int kFramesBetweenLooks = 30;
+    if (estimate.frame.value % kFramesBetweenLooks == kFramesBetweenLooks - 1) {
+      num_segments_ = CountSegments(result);
+    }
+    return {std::to_string(estimate.report.num_inliers) + " inliers",
+            Counted(num_loops_, "loop"),
+            Counted(num_segments_, "segment")};
+  }
+
+ private:
+  static std::string Counted(std::int64_t count, const std::string& what) {
+    return std::to_string(count) + " " + what + (count == 1 ? "" : "s");
+  }
+
+  // Stretches on which the camera moves, or does not.
+  std::int64_t CountSegments(const OdometryResult& result) const {
+    const RotationMap& cam_from_world = result.cam_from_world;
+    std::int64_t count = 0;
+    int next = cam_from_world.begin()->first.value;
+    for (const HeldStretch& stretch : FindHeldStretches(result.graph, cam_from_world, held_)) {
+      count += stretch.first.value > next ? 2 : 1;
+      next = stretch.last.value + 1;
+    }
+    return count + (cam_from_world.rbegin()->first.value >= next ? 1 : 0);
+  }
+
+  HeldStretchOptions held_;
+  std::int64_t num_loops_ = 0;
+  std::int64_t num_segments_ = 1;
+};
+
+void TellDetails(const LoopedEstimate& estimate, Progress& progress) {
+  const FrameReport& report = estimate.report;
+  progress.Detail("frame " + std::to_string(estimate.frame.value) + ": " +
+                  std::to_string(report.num_tracked) + " points tracked, " +
+                  std::to_string(report.num_inliers) + " inliers" +
+                  (report.predicted_only ? ", no edge" : "") + (report.weak ? ", weak" : "") +
+                  (report.searched_wide ? ", searched wide" : "") +
+                  (estimate.has_averaged ? ", drift spread over all orientations" : ""));
+  for (const LoopCheck& check : estimate.loops) {
+    progress.Detail("frame " + std::to_string(check.frame.value) + " looks like frame " +
+                    std::to_string(check.match.value) + ": " + std::to_string(check.num_inliers) +
+                    " inliers, " + std::to_string(check.angle_deg) + " deg around the loop, " +
+                    (check.accepted ? "accepted" : "not accepted"));
+  }
+}
+
 }  // namespace
 
 Orientations FindOrientations(Input& input,
@@ -80,6 +138,7 @@ Orientations FindOrientations(Input& input,
                               std::shared_ptr<const Vocabulary> vocabulary,
                               bool keep_features,
                               const CommonFlags& flags,
+                              const Interruption& interruption,
                               Progress& progress) {
   LoopedOdometry odometry(input.camera,
                           options.rotodom,
@@ -89,6 +148,7 @@ Orientations FindOrientations(Input& input,
                           flags.seed,
                           flags.NumThreads());
   Orientations orientations;
+  LiveCounters counters(options.held_stretches);
   progress.StartStage("orientations", input.sequence->NumFrames());
   while (const std::optional<Frame> frame = input.sequence->Next()) {
     if (frame->image.empty()) {
@@ -101,9 +161,15 @@ Orientations FindOrientations(Input& input,
     orientations.image_names.push_back(frame->name);
     orientations.num_weak += estimate.report.weak;
     orientations.reports.push_back(estimate.report);
-    progress.Step(frame->id.value + 1, std::to_string(estimate.report.num_inliers) + " inliers");
+    TellDetails(estimate, progress);
+    progress.Step(frame->id.value + 1, counters.Update(estimate, odometry.result()));
     orientations.loops.insert(
         orientations.loops.end(), estimate.loops.begin(), estimate.loops.end());
+    orientations.interrupted = interruption.IsRequested();
+    if (orientations.interrupted) {
+      progress.Say("interrupted: putting together what there is; once more ends at once");
+      break;
+    }
   }
   const std::vector<LoopCheck> last_loops = odometry.Finish();
   orientations.loops.insert(orientations.loops.end(), last_loops.begin(), last_loops.end());
@@ -114,6 +180,10 @@ Orientations FindOrientations(Input& input,
   static_cast<OdometryResult&>(orientations) = odometry.TakeResult();
 
   const int num_frames = static_cast<int>(orientations.timestamps_s.size());
+  if (orientations.interrupted && (num_frames < 3 || orientations.graph.edges().empty())) {
+    throw InterruptedError("interrupted after frame " + std::to_string(num_frames - 1) +
+                           ": too early, nothing is written");
+  }
   if (num_frames < 3) {
     throw std::runtime_error("only " + std::to_string(num_frames) +
                              " frames could be read; at least 3 are needed");

@@ -7,6 +7,7 @@
 
 #include "apps/given_rotations.h"
 #include "apps/input.h"
+#include "apps/interruption.h"
 #include "apps/pipeline.h"
 #include "apps/progress.h"
 #include "output/loops_csv.h"
@@ -18,6 +19,7 @@ namespace rotslam {
 
 /// What the first stage knows once the sequence has been read.
 struct Orientations : OdometryResult {
+  bool interrupted = false;              // before the sequence's end
   std::vector<double> timestamps_s;      // by frame id
   std::vector<std::string> image_names;  // by frame id
   // Set: `cam_from_world` and `covariance` are these, and only the edges are the images'.
@@ -39,7 +41,9 @@ struct Orientations : OdometryResult {
 
 /// Reads the sequence to its end and finds every frame's orientation. Frames that could not be
 /// matched get theirs by interpolation in time between the nearest frames that could. Throws
-/// std::runtime_error when there are fewer than three frames or no two of them match.
+/// std::runtime_error when there are fewer than three frames or no two of them match;
+/// InterruptedError where that is so because `interruption` came first. It stops after the frame at
+/// hand.
 /// @param input       with `given_rotations`, these replace what the images say (see
 ///                    MatchGivenRotations, which says what it throws).
 /// @param vocabulary  null for the one that comes with the program.
@@ -48,6 +52,7 @@ Orientations FindOrientations(Input& input,
                               std::shared_ptr<const Vocabulary> vocabulary,
                               bool keep_features,
                               const CommonFlags& flags,
+                              const Interruption& interruption,
                               Progress& progress);
 
 /// Gives the frames without an edge the orientation between those of the nearest frames in time

@@ -4,6 +4,8 @@
 #include <utility>
 
 #include "apps/command.h"
+#include "apps/focal_guess.h"
+#include "apps/interruption.h"
 #include "apps/orientations.h"
 #include "apps/pipeline.h"
 #include "apps/progress.h"
@@ -22,7 +24,8 @@ struct RotationsFlags {
 
 int FindAndWriteRotations(const RotationsFlags& flags) {
   const auto start = std::chrono::steady_clock::now();
-  Progress progress(flags.common.quiet);
+  Interruption interruption;
+  Progress progress(flags.common);
   // The whole pipeline's options, so that one configuration file serves `run` and `rotations`.
   PipelineOptions options = ReadPipelineOptions(flags.common, flags.input);
   if (!flags.averaging.empty()) options.rotodom.averaging.mode = flags.averaging;
@@ -31,18 +34,24 @@ int FindAndWriteRotations(const RotationsFlags& flags) {
       flags.input, options.sequence, [&](const std::string& line) { progress.Say(line); });
   auto vocabulary = OpenVocabulary(flags.input);
   const std::filesystem::path directory = PrepareRunDirectory(flags.input.out);
-  const Orientations orientations =
-      FindOrientations(input, options, std::move(vocabulary), false, flags.common, progress);
+  RefineGuess(flags.input, flags.common, options, interruption, progress, input);
+  const Orientations orientations = FindOrientations(
+      input, options, std::move(vocabulary), false, flags.common, interruption, progress);
   WriteOrientations(directory, orientations);
   RunSummary summary = StartSummary("rotations", input, orientations, DescribeOptions(options));
   summary.seconds.push_back(
       {"total", std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count()});
   WriteSummary(directory / "summary.json", summary);
   if (flags.use_report) WriteReportOfRun(directory, flags.common, progress);
+  if (input.guess) progress.Warn(WarningOf(*input.guess, input.camera));
+  if (orientations.interrupted) {
+    progress.Warn(DescribeInterrupted(directory, orientations));
+    return Interruption::kExitCode;
+  }
   progress.Say("wrote " + (directory / "rotations_tum.txt").string() +
                ", rotations.csv, loops.csv, view_graph.g2o, summary.json" +
                (flags.use_report ? ", report.html" : ""));
-  return 0;
+  return interruption.IsRequested() ? Interruption::kExitCode : 0;
 }
 
 }  // namespace

@@ -4,6 +4,8 @@
 #include <utility>
 
 #include "apps/command.h"
+#include "apps/focal_guess.h"
+#include "apps/interruption.h"
 #include "apps/orientations.h"
 #include "apps/pipeline.h"
 #include "apps/positions.h"
@@ -32,7 +34,8 @@ double SecondsSince(Clock::time_point start) {
 
 int Run(const RunFlags& flags) {
   const Clock::time_point start = Clock::now();
-  Progress progress(flags.common.quiet);
+  Interruption interruption;
+  Progress progress(flags.common);
   PipelineOptions options = ReadPipelineOptions(flags.common, flags.input);
   flags.krot.Override(options.krot);
 
@@ -40,13 +43,29 @@ int Run(const RunFlags& flags) {
       flags.input, options.sequence, [&](const std::string& line) { progress.Say(line); });
   auto vocabulary = OpenVocabulary(flags.input);
   const std::filesystem::path directory = PrepareRunDirectory(flags.input.out);
-  const Orientations orientations =
-      FindOrientations(input, options, std::move(vocabulary), true, flags.common, progress);
+  RefineGuess(flags.input, flags.common, options, interruption, progress, input);
+  if (input.guess) FreeFocal(options.ba.lens);
+  const Orientations orientations = FindOrientations(
+      input, options, std::move(vocabulary), true, flags.common, interruption, progress);
   WriteOrientations(directory, orientations);
   const double orientations_s = SecondsSince(start);
+  const auto end_early = [&] {
+    RunSummary summary = StartSummary("run", input, orientations, DescribeOptions(options));
+    summary.interrupted = true;
+    summary.seconds.push_back({"orientations", orientations_s});
+    summary.seconds.push_back({"total", SecondsSince(start)});
+    WriteSummary(directory / "summary.json", summary);
+    progress.Warn(DescribeInterrupted(directory, orientations));
+  };
+  if (orientations.interrupted) {
+    end_early();
+    return Interruption::kExitCode;
+  }
 
-  const PositionResult positions =
-      FindPositions(orientations, input.camera, options, flags.common.NumThreads(), progress);
+  const PositionResult positions = [&] {
+    const LastWords last_words(interruption, end_early);
+    return FindPositions(orientations, input.camera, options, flags.common.NumThreads(), progress);
+  }();
   const double positions_s = SecondsSince(start) - orientations_s;
   WritePositions(directory,
                  orientations,
@@ -58,6 +77,7 @@ int Run(const RunFlags& flags) {
 
   RunSummary summary = StartSummary("run", input, orientations, DescribeOptions(options));
   AddPositions(positions, input.camera, summary);
+  if (input.guess) summary.calibration = SummaryOf(*input.guess, positions.camera);
   summary.seconds.push_back({"orientations", orientations_s});
   summary.seconds.push_back({"positions", positions_s});
   summary.seconds.push_back({"total", SecondsSince(start)});
@@ -68,6 +88,7 @@ int Run(const RunFlags& flags) {
                   std::to_string(positions.components[k].keyframes.begin()->value) +
                   " on to the part before; it is set so that the speed is continuous");
   }
+  if (input.guess) progress.Warn(WarningOf(*input.guess, positions.camera));
   if (positions.is_held_throughout) {
     progress.Warn(
         "the camera never leaves its place, so there are no positions and no points to find");
@@ -79,7 +100,9 @@ int Run(const RunFlags& flags) {
                "view_graph.g2o, "
                "known_rotation.txt, map.bin, map_all_frames.bin, summary.json" +
                (flags.use_report ? ", report.html" : ""));
-  if (positions.failure.empty()) return 0;
+  if (positions.failure.empty()) {
+    return interruption.IsRequested() ? Interruption::kExitCode : 0;
+  }
   throw std::runtime_error("orientations are in " + directory.string() +
                            ", positions are not: " + positions.failure);
 }

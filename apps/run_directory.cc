@@ -7,6 +7,7 @@
 #include <stdexcept>
 #include <system_error>
 
+#include "apps/focal_guess.h"
 #include "output/atomic_file.h"
 #include "output/g2o.h"
 #include "output/known_rotation_file.h"
@@ -236,14 +237,23 @@ void WriteMaps(const std::filesystem::path& directory,
   WriteRunMap(directory / "map_all_frames.bin", map);
 }
 
+std::string DescribeInterrupted(const std::filesystem::path& directory,
+                                const Orientations& orientations) {
+  return "interrupted after " + std::to_string(orientations.timestamps_s.size()) +
+         " frames; their orientations are in " + directory.string() +
+         ": rotations_tum.txt, rotations.csv, loops.csv, view_graph.g2o, summary.json";
+}
+
 RunSummary StartSummary(const std::string& command,
                         const Input& input,
                         const Orientations& orientations,
                         std::vector<OptionEntry> options) {
   RunSummary summary;
   summary.command = command;
+  summary.interrupted = orientations.interrupted;
   summary.options = std::move(options);
   summary.camera = input.camera;
+  if (input.guess) summary.calibration = SummaryOf(*input.guess, input.camera);
   const auto count = [](std::size_t value) { return static_cast<std::int64_t>(value); };
   summary.sequence = {{"description", input.sequence->Describe()},
                       {"path", input.path},

@@ -1,6 +1,8 @@
 #pragma once
 
 #include <filesystem>
+#include <string>
+#include <vector>
 
 #include "apps/orientations.h"
 #include "apps/positions.h"
@@ -38,6 +40,10 @@ void WriteMaps(const std::filesystem::path& directory,
                const Orientations& orientations,
                const PositionResult& positions,
                const FeatureOptions& features);
+
+/// What the terminal says of a run that Ctrl-C has ended: what WriteOrientations has left.
+std::string DescribeInterrupted(const std::filesystem::path& directory,
+                                const Orientations& orientations);
 
 /// The parts of summary.json that `run` and `rotations` share.
 RunSummary StartSummary(const std::string& command,

@@ -140,7 +140,7 @@ RunSummary Summarise(const SolveFlags& flags,
 
 int Solve(const SolveFlags& flags) {
   const Clock::time_point start = Clock::now();
-  Progress progress(flags.common.quiet);
+  Progress progress(flags.common);
   PipelineOptions options;
   if (!flags.common.config.empty()) LoadOptionsYaml(flags.common.config, options);
   flags.krot.Override(options.krot);

@@ -140,7 +140,7 @@ int Train(VocabularyFlags flags) {
   if (images.size() < 2) {
     throw std::invalid_argument("vocabulary train: one image is not enough; name at least two");
   }
-  Progress progress(flags.common.quiet);
+  Progress progress(flags.common);
   const auto descriptors = DescribeImages(images, flags, progress);
   progress.StartStage("clustering", flags.training.depth);
   const Vocabulary vocabulary =
@@ -229,11 +229,13 @@ void AddVocabularyCommand(CLI::App& app, Action& action) {
   CLI::App* command = app.add_subcommand(
       "vocabulary", "Visual words, by which places are recognised: train, look at, convert");
   command->require_subcommand(1);
+  command->footer("Example: rotslam vocabulary train footage/ --out mine.rotvoc");
   AddTrainCommand(*command, flags, action);
 
   CLI::App* info = command->add_subcommand("info", "What a vocabulary file holds");
   info->add_option("file", flags->in, "Vocabulary file; default: the one in this program");
   AddCommonFlags(*info, flags->common);
+  info->footer("Example: rotslam vocabulary info ORBvoc.txt");
   info->callback([flags, &action] { action = [flags] { return PrintInfo(*flags); }; });
 
   CLI::App* convert = command->add_subcommand("convert", "From text to binary or back");

@@ -2,6 +2,8 @@
 
 #include <cerrno>
 #include <cstdio>
+#include <mutex>
+#include <set>
 #include <stdexcept>
 #include <string>
 #include <system_error>
@@ -27,12 +29,49 @@ void WriteWhole(const std::filesystem::path& path,
   if (!closed) Refuse(path, std::generic_category().message(errno));
 }
 
+// The temporary files there are. Global, because who ends the program knows none of the writers.
+struct TemporaryFiles {
+  std::mutex mutex;
+  std::multiset<std::filesystem::path> paths;
+};
+
+TemporaryFiles& Temporaries() {
+  static auto* const temporaries = new TemporaryFiles;  // outlives every thread
+  return *temporaries;
+}
+
+class TemporaryFile {
+ public:
+  explicit TemporaryFile(const std::filesystem::path& path) {
+    const std::scoped_lock lock(Temporaries().mutex);
+    entry_ = Temporaries().paths.insert(path);
+  }
+  ~TemporaryFile() {
+    const std::scoped_lock lock(Temporaries().mutex);
+    Temporaries().paths.erase(entry_);
+  }
+  TemporaryFile(const TemporaryFile&) = delete;
+  TemporaryFile& operator=(const TemporaryFile&) = delete;
+
+ private:
+  std::multiset<std::filesystem::path>::iterator entry_;
+};
+
 }  // namespace
+
+void RemoveTemporaryFiles() {
+  Temporaries().mutex.lock();
+  std::error_code error;
+  for (const std::filesystem::path& path : Temporaries().paths) {
+    std::filesystem::remove(path, error);
+  }
+}
 
 void ReplaceFile(const std::filesystem::path& path,
                  const std::function<void(const std::filesystem::path& temporary)>& write) {
   std::filesystem::path temporary = path;
   temporary += ".tmp";
+  const TemporaryFile registered(temporary);
   std::error_code error;
   try {
     write(temporary);

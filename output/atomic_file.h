@@ -17,4 +17,8 @@ void ReplaceFile(const std::filesystem::path& path,
 /// The same for content already in memory.
 void ReplaceFile(const std::filesystem::path& path, std::string_view content);
 
+/// For a program that is about to end while other threads write: removes the temporary files there
+/// are. Afterwards every ReplaceFile waits for ever.
+void RemoveTemporaryFiles();
+
 }  // namespace rotslam

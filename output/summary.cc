@@ -76,9 +76,11 @@ std::string Version() { return ROTSLAM_VERSION; }
 std::string SummaryJson(const RunSummary& summary) {
   Json json = {{"version", Version()}};
   json["command"] = summary.command;
+  if (summary.interrupted) json["interrupted"] = true;
   json["options"] = OptionsToJson(summary.options);
   json["sequence"] = TableToJson(summary.sequence);
   if (summary.camera) json["camera"] = CameraToJson(*summary.camera);
+  if (summary.calibration) json["calibration"] = TableToJson(*summary.calibration);
   json["counts"] = TableToJson(summary.counts);
   json["seconds"] = TableToJson(summary.seconds);
   if (summary.rotodom) json["rotodom"] = TableToJson(*summary.rotodom);

@@ -35,9 +35,12 @@ struct SummaryKrot {
 /// parts that a command does not run stay nullopt and are absent from the file.
 struct RunSummary {
   std::string command;  // "run", "rotations"
+  // Ctrl-C ended the command early: what it had by then is here. Absent from the file when false.
+  bool interrupted = false;
   std::vector<OptionEntry> options;
   SummaryTable sequence;
   std::optional<Camera> camera;
+  std::optional<SummaryTable> calibration;  // of a camera that no calibration file gives
   SummaryTable counts;
   SummaryTable seconds;
   std::optional<SummaryTable> rotodom;

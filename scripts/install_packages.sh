@@ -13,7 +13,7 @@ packages=(
   # krot and ba
   coinor-libclp-dev libceres-dev libgoogle-glog-dev
   # output and apps
-  libcli11-dev libpcl-dev libsqlite3-dev nlohmann-json3-dev
+  libcli11-dev libexif-dev libpcl-dev libspdlog-dev libsqlite3-dev nlohmann-json3-dev
   # Python module; numpy also for the independent check of `rotslam eval`
   pybind11-dev python3-dev python3-numpy
   # the report and the plots

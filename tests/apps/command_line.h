@@ -56,7 +56,10 @@ inline CommandResult Rotslam(std::vector<std::string> arguments,
 }
 
 /// The same on a terminal of its own, of so many columns; everything printed is in `output`.
-inline CommandResult RotslamOnTerminal(const std::vector<std::string>& arguments, int columns) {
+/// @param environment  what it has of it besides the test's, "NAME=value".
+inline CommandResult RotslamOnTerminal(const std::vector<std::string>& arguments,
+                                       int columns,
+                                       std::vector<std::string> environment = {"NO_COLOR=1"}) {
   std::vector<std::string> words = {ROTSLAM_EXECUTABLE};
   words.insert(words.end(), arguments.begin(), arguments.end());
   std::vector<char*> argv;
@@ -68,6 +71,7 @@ inline CommandResult RotslamOnTerminal(const std::vector<std::string>& arguments
   int terminal = -1;
   const pid_t child = forkpty(&terminal, nullptr, nullptr, &size);
   if (child == 0) {
+    for (std::string& variable : environment) putenv(variable.data());
     execv(argv[0], argv.data());
     _exit(127);
   }

@@ -1,10 +1,12 @@
 #include "output/atomic_file.h"
 
 #include <filesystem>
+#include <fstream>
 #include <stdexcept>
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
+#include <unistd.h>
 
 #include "tests/output/temporary_folder.h"
 
@@ -53,6 +55,21 @@ TEST(ReplaceFile, ReportsAFullDisk) {
   const std::string message =
       RuntimeErrorOf([&] { ReplaceFile(folder.path() / "a.txt", std::string(1 << 16, 'x')); });
   EXPECT_THAT(message, testing::HasSubstr("No space left"));
+}
+
+TEST(RemoveTemporaryFiles, LeavesNoHalfOfAFile) {
+  const TemporaryFolder folder;
+  const auto path = folder.Write("a.txt", "old");
+  EXPECT_EXIT(ReplaceFile(path,
+                          [&](const std::filesystem::path& temporary) {
+                            std::ofstream(temporary) << "half";
+                            RemoveTemporaryFiles();
+                            _exit(7);
+                          }),
+              testing::ExitedWithCode(7),
+              "");
+  EXPECT_EQ(ReadWholeFile(path), "old");
+  EXPECT_FALSE(std::filesystem::exists(folder.path() / "a.txt.tmp"));
 }
 
 }  // namespace
