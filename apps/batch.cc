@@ -81,7 +81,7 @@ std::vector<std::string> ArgumentsOf(const Task& task, const BatchFlags& flags) 
 class Runner {
  public:
   Runner(const std::vector<Task>& tasks, const BatchFlags& flags)
-      : tasks_(tasks), flags_(flags), progress_(flags.common.quiet) {}
+      : tasks_(tasks), flags_(flags), progress_(flags.common) {}
 
   /// Runs the tasks of these numbers, as many at a time as --jobs says. Gives how many failed.
   int Run(const std::vector<int>& numbers) {
@@ -164,7 +164,7 @@ int Collect(const std::vector<Task>& tasks, const BatchFlags& flags) {
   ReplaceFile(directory / "results.csv", ResultsCsv(results));
   ReplaceFile(directory / "results.html",
               ResultsHtml(results, fs::path(flags.list).filename().string()));
-  Progress(flags.common.quiet)
+  Progress(flags.common)
       .Say("wrote " + (directory / "results.csv").string() + ", results.html");
   return static_cast<int>(
       std::count_if(results.begin(), results.end(), [](const BatchResult& result) {
@@ -186,7 +186,7 @@ int WriteSlurm(const std::vector<Task>& tasks, const BatchFlags& flags) {
   if (flags.jobs_given) job.max_running = flags.jobs;
   job.num_threads = flags.ThreadsPerJob();
   ReplaceFile(flags.slurm, SlurmScript(job));
-  Progress(flags.common.quiet)
+  Progress(flags.common)
       .Say("wrote " + flags.slurm + "; submit it with sbatch, then collect with --collect");
   return 0;
 }
