@@ -80,9 +80,10 @@ class Drawing::SvgWriter {
   void operator()(const Dots& dots) {
     const std::string side = Number(dots.size);
     svg_ += "<path" + Fill(dots.color) + " d=\"";
+    const std::string square = "h" + side + "v" + side + "h-" + side + "z";
     for (const Eigen::Vector2d& point : dots.points) {
-      svg_ += "M" + Number(point.x() - 0.5 * dots.size) + " " +
-              Number(point.y() - 0.5 * dots.size) + "h" + side + "v" + side + "h-" + side + "z";
+      svg_.append("M").append(Number(point.x() - 0.5 * dots.size));
+      svg_.append(" ").append(Number(point.y() - 0.5 * dots.size)).append(square);
     }
     svg_ += "\"/>\n";
   }
