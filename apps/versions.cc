@@ -61,7 +61,7 @@ std::string VersionText() {
       {"spdlog", Dotted(SPDLOG_VER_MAJOR, SPDLOG_VER_MINOR, SPDLOG_VER_PATCH)}};
   std::string text = "rotslam " + Version();
   for (const auto& [name, version] : parts) {
-    text += "\n  " + name + std::string(15 - name.size(), ' ') + version;
+    text.append("\n  ").append(name).append(15 - name.size(), ' ').append(version);
   }
   return text;
 }
