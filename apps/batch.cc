@@ -164,8 +164,7 @@ int Collect(const std::vector<Task>& tasks, const BatchFlags& flags) {
   ReplaceFile(directory / "results.csv", ResultsCsv(results));
   ReplaceFile(directory / "results.html",
               ResultsHtml(results, fs::path(flags.list).filename().string()));
-  Progress(flags.common)
-      .Say("wrote " + (directory / "results.csv").string() + ", results.html");
+  Progress(flags.common).Say("wrote " + (directory / "results.csv").string() + ", results.html");
   return static_cast<int>(
       std::count_if(results.begin(), results.end(), [](const BatchResult& result) {
         return result.status != "done";
