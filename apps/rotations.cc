@@ -42,12 +42,12 @@ int FindAndWriteRotations(const RotationsFlags& flags) {
   summary.seconds.push_back(
       {"total", std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count()});
   WriteSummary(directory / "summary.json", summary);
-  if (flags.use_report) WriteReportOfRun(directory, flags.common, progress);
   if (input.guess) progress.Warn(WarningOf(*input.guess, input.camera));
   if (orientations.interrupted) {
     progress.Warn(DescribeInterrupted(directory, orientations));
     return Interruption::kExitCode;
   }
+  if (flags.use_report) WriteReportOfRun(directory, flags.common, progress);
   progress.Say("wrote " + (directory / "rotations_tum.txt").string() +
                ", rotations.csv, loops.csv, view_graph.g2o, summary.json" +
                (flags.use_report ? ", report.html" : ""));
