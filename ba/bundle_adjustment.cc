@@ -132,13 +132,11 @@ class Rounds {
 
   // Of what the state holds now.
   void FindCovariances(const BundleRound& round, BundleState& state) {
-    if (!options_.find_covariance && !refine_lens_) return;
+    if (!options_.find_covariance) return;
     const auto found = rotslam::FindCovariances(calibrated_, round, refine_lens_, options_, state);
     if (!found) return;
-    if (options_.find_covariance) {
-      for (std::size_t k = 0; k < state.frames.size(); ++k) {
-        if (found->poses[k]) result_.pose_covariance[state.frames[k].id] = *found->poses[k];
-      }
+    for (std::size_t k = 0; k < state.frames.size(); ++k) {
+      if (found->poses[k]) result_.pose_covariance[state.frames[k].id] = *found->poses[k];
     }
     if (found->lens) result_.summary.lens_sigmas = SigmasOf(*found->lens);
   }

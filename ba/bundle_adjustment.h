@@ -92,7 +92,7 @@ struct BundleSummary {
   int num_dropped_observations = 0;  // of the observations given, dropped tracks' included
   double lens_gain = 0.0;     // share of the cost that another lens took off, see LensOptions
   bool lens_refined = false;  // whether that was enough
-  std::optional<LensSigmas> lens_sigmas;  // where it was
+  std::optional<LensSigmas> lens_sigmas;  // where it was, with `options.find_covariance`
   double seconds = 0.0;
   std::vector<BundleRoundSummary> rounds;
 };

@@ -45,7 +45,7 @@ bool SharesCenters(const BundleState& state) {
 
 // The cameras' numbers, in one piece of memory: Ceres sorts the blocks of a group by address, and
 // with it the order of elimination, which must not depend on where an allocation lands. Poses are
-// one block each, which eliminates points three times as fast as rotations and centres apart; only
+// one block each, for which Ceres has its specialised elimination of points; only
 // frames that share a centre need those.
 class CameraBlocks {
  public:

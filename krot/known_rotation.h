@@ -86,8 +86,8 @@ struct KrotSolution {
 ///          names a view without rotation, or the camera has no focal length.
 /// Error:   truth to 1e-6 (relative to the scene) on clean scenes (KnownRotation tests).
 /// Cost:    one thread, sequences with tracks of 5 to 7 views: 44 views and 50,000 observations
-///          0.5 s and 0.3 s more for the bracket, 67 and 89,000 0.9 s and 0.6 s, 100 and 149,000
-///          2 s and 0.7 s. Start and bracket grow like the observations to the power 1.2.
+///          0.5 s and 0.4 s more for the bracket, 67 and 89,000 1.2 s and 0.6 s, 100 and 149,000
+///          2.7 s and 1.6 s. The start grows like the observations to the power 1.5.
 /// Source:  Kahl & Hartley, Multiple-View Geometry under the L-infinity Norm, PAMI 2008, for the
 ///          bracket; Dalalyan & Keriven, L1-penalized robust estimation for a class of inverse
 ///          problems arising in multiview geometry, NIPS 2009, for the L1 start; resection as in

@@ -57,8 +57,7 @@ struct Products {
   Fives yr, zs;
 };
 
-// First iterate at `x`: exactly central, y r = z s = mu. A generous mu makes the first steps long;
-// from a small one they were three times as many.
+// First iterate at `x`: exactly central, y r = z s = mu. A generous mu makes the first steps long.
 Iterate Start(const Program& program, Eigen::VectorXd x) {
   constexpr double kFirstMu = 10.0;
   Iterate at;

@@ -15,7 +15,7 @@ struct L1InteriorOptions {
 };
 
 /// SolveL1Slack by an interior-point method of our own, which eliminates the slacks and points and
-/// factors the centres' system: some hundred times less work than a general engine.
+/// factors the centres' system.
 /// @param weights  price of each observation's slack, positive; empty: all one.
 /// @param start    first iterate, and where the problem's fixed views and points are: needed when
 /// it

@@ -9,7 +9,7 @@ namespace rotslam {
 
 struct SelectionOptions {
   // Observations each view should have in the linear programs. 40 well spread ones hold a view as
-  // firmly as all (L1 start: 0.25 to 0.55 s for 70 views).
+  // firmly as all.
   int observations_per_view = 40;
   // Tracks under this parallax come last: their depth is hardly known, and a depth range of 1e6
   // instead of about 50 spoils the programs' conditioning.

@@ -30,10 +30,10 @@ using TriangulatedTracks = std::vector<std::optional<TriangulatedTrack>>;  // by
 /// @param thresholds  of each track, largest bearing error of a right observation, rad; counted
 ///                    options.loose_factor times.
 TriangulatedTracks TriangulateAll(const RotationMap& cam_from_world,
-                           const CenterMap& centers,
-                           const std::vector<Track>& tracks,
-                           const std::vector<double>& thresholds,
-                           const KrotOptions& options,
-                           const KrotUnits& units);
+                                  const CenterMap& centers,
+                                  const std::vector<Track>& tracks,
+                                  const std::vector<double>& thresholds,
+                                  const KrotOptions& options,
+                                  const KrotUnits& units);
 
 }  // namespace rotslam

@@ -306,6 +306,7 @@ TEST(RefineBundle, RefinesAPrincipalPointWhenAsked) {
       MakeBaScene({.num_frames = 40, .num_points = 1500, .noise_px = 0.2, .camera = lens});
   scene.camera = BaCamera();
   BundleOptions options;
+  options.find_covariance = true;
   options.lens.refine_principal_point = true;
   options.lens.refine_distortion = false;
   options.lens.principal_sigma = 0.05;
@@ -389,6 +390,7 @@ TEST(RefineBundle, StatesHowWellTheLensIsKnown) {
   lens.fx *= 1.02;
   lens.fy *= 1.02;
   BundleOptions options;
+  options.find_covariance = true;
   options.lens.refine_focal = true;
   options.lens.refine_distortion = false;
   options.lens.focal_sigma = 1.0;  // the images alone decide
