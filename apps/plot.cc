@@ -8,6 +8,7 @@
 #include "apps/report/figures.h"
 #include "apps/report/run_data.h"
 #include "apps/run_directory.h"
+#include "apps/run_report.h"
 #include "output/atomic_file.h"
 
 namespace rotslam {
@@ -53,12 +54,7 @@ void AddPlotCommand(CLI::App& app, Action& action) {
   command->add_option("run", flags->run, "Folder that `run` or `rotations` has written to")
       ->required();
   command->add_option("--out", flags->out, "Folder for the figures (default: plots/ in the run's)");
-  command->add_option("--ground-truth",
-                      flags->truth.file,
-                      "TUM or KITTI file, camera->world (default: the one beside the images)");
-  command->add_option("--times",
-                      flags->truth.times,
-                      "Timestamps of a KITTI file, one a line (default: times.txt beside it)");
+  AddTruthFlags(*command, flags->truth);
   command->add_option("--dpi", flags->dots_per_inch, "Of the PNG files (default: 200)")
       ->check(CLI::Range(20.0, 1200.0));
   AddCommonFlags(*command, flags->common);

@@ -57,6 +57,15 @@ void WriteReportOfRun(const std::filesystem::path& directory,
   }
 }
 
+void AddTruthFlags(CLI::App& command, TruthSource& truth) {
+  command.add_option("--ground-truth",
+                     truth.file,
+                     "TUM or KITTI file, camera->world (default: the one beside the images)");
+  command.add_option("--times",
+                     truth.times,
+                     "Timestamps of a KITTI file, one a line (default: times.txt beside it)");
+}
+
 void AddReportFlag(CLI::App& command, bool& use_report) {
   command.add_flag("--report,!--no-report",
                    use_report,
@@ -70,12 +79,7 @@ void AddReportCommand(CLI::App& app, Action& action) {
   command->add_option("run", flags->run, "Folder that `run` or `rotations` has written to")
       ->required();
   command->add_option("--out", flags->out, "Page to write (default: report.html in that folder)");
-  command->add_option("--ground-truth",
-                      flags->truth.file,
-                      "TUM or KITTI file, camera->world (default: the one beside the images)");
-  command->add_option("--times",
-                      flags->truth.times,
-                      "Timestamps of a KITTI file, one a line (default: times.txt beside it)");
+  AddTruthFlags(*command, flags->truth);
   command->add_option(
       "--sequence", flags->report.sequence, "Where the images are now, if they moved");
   command

@@ -1,5 +1,6 @@
 #include "ba/reprojection_cost.h"
 
+#include <ceres/autodiff_cost_function.h>
 #include <ceres/manifold_test_utils.h>
 #include <gtest/gtest.h>
 
@@ -100,6 +101,66 @@ TEST_P(ReprojectionForEveryCamera, JacobiansOfCostsEqualCentralDifferences) {
       }
     }
   }
+}
+
+// The same residual written for Ceres' automatic derivatives.
+struct AutomaticReprojection {
+  Camera camera;
+  Eigen::Vector2d keypoint_px;
+  double sigma_px;
+
+  template <typename T>
+  bool operator()(const T* pose, const T* point, T* residuals) const {
+    const Eigen::Map<const Eigen::Quaternion<T>> q(pose);
+    const Eigen::Map<const Eigen::Vector<T, 3>> center(pose + 4);
+    const Eigen::Map<const Eigen::Vector<T, 3>> X(point);
+    const Eigen::Vector<T, 3> p = q.normalized() * Eigen::Vector<T, 3>(X - center);
+    const auto& d = camera.distortion;
+    T x = p.x() / p.z();
+    T y = p.y() / p.z();
+    const T r2 = x * x + y * y;
+    if (camera.model == CameraModel::kEquidistant) {
+      const T r = sqrt(r2);
+      const T theta = atan(r);
+      const T t2 = theta * theta;
+      const T bent = theta * (1.0 + t2 * (d[0] + t2 * (d[1] + t2 * (d[2] + t2 * d[3]))));
+      x *= bent / r;
+      y *= bent / r;
+    } else if (camera.model == CameraModel::kRadtan) {
+      const T radial = 1.0 + r2 * (d[0] + r2 * (d[1] + r2 * d[4]));
+      const T x_bent = x * radial + 2.0 * d[2] * x * y + d[3] * (r2 + 2.0 * x * x);
+      y = y * radial + d[2] * (r2 + 2.0 * y * y) + 2.0 * d[3] * x * y;
+      x = x_bent;
+    }
+    residuals[0] = (camera.fx * x + camera.cx - keypoint_px.x()) / sigma_px;
+    residuals[1] = (camera.fy * y + camera.cy - keypoint_px.y()) / sigma_px;
+    return true;
+  }
+};
+
+TEST_P(ReprojectionForEveryCamera, JacobiansEqualAutomaticDerivatives) {
+  const Camera camera = BaCamera(GetParam());
+  const Eigen::Vector2d keypoint_px(600.0, 200.0);
+  const ReprojectionCost ours(camera, keypoint_px, 0.7);
+  const ceres::AutoDiffCostFunction<AutomaticReprojection, 2, 7, 3> automatic(
+      new AutomaticReprojection{camera, keypoint_px, 0.7});
+  Eigen::Vector<double, 7> pose;
+  pose << Rotation::Exp({0.3, -0.2, 0.1}).Quaternion().coeffs(), 0.4, -0.3, 0.2;
+  const Eigen::Vector3d point(1.1, -0.7, 4.0);
+  const double* const blocks[] = {pose.data(), point.data()};
+  using ByPose = Eigen::Matrix<double, 2, 7, Eigen::RowMajor>;
+  using ByPoint = Eigen::Matrix<double, 2, 3, Eigen::RowMajor>;
+  ByPose by_pose[2];
+  ByPoint by_point[2];
+  Eigen::Vector2d residuals[2];
+  const ceres::CostFunction* const costs[] = {&ours, &automatic};
+  for (int k = 0; k < 2; ++k) {
+    double* jacobians[] = {by_pose[k].data(), by_point[k].data()};
+    ASSERT_TRUE(costs[k]->Evaluate(blocks, residuals[k].data(), jacobians));
+  }
+  EXPECT_LT((residuals[0] - residuals[1]).norm(), 1e-10 * residuals[1].norm());
+  EXPECT_LT((by_pose[0] - by_pose[1]).norm(), 1e-10 * by_pose[1].norm());
+  EXPECT_LT((by_point[0] - by_point[1]).norm(), 1e-10 * by_point[1].norm());
 }
 
 TEST(LensPriorCost, IsZeroAtWhatIsExpectedAndItsJacobianEqualsCentralDifferences) {
