@@ -2,6 +2,7 @@
 #include <chrono>
 #include <cstdint>
 #include <filesystem>
+#include <limits>
 #include <map>
 #include <memory>
 #include <set>
@@ -20,7 +21,10 @@
 #include "output/atomic_file.h"
 #include "output/known_rotation_file.h"
 #include "output/ply.h"
+#include "output/rotation_list.h"
 #include "output/trajectory.h"
+#include "rotodom/averaging/global_averaging.h"
+#include "rotodom/tracks/keyframes.h"
 
 namespace rotslam {
 namespace {
@@ -31,11 +35,50 @@ struct SolveFlags {
   CommonFlags common;
   KrotFlags krot;
   std::string input;
+  std::string relative_rotations;
   std::string out;
 };
 
 double SecondsSince(Clock::time_point start) {
   return std::chrono::duration<double>(Clock::now() - start).count();
+}
+
+// Orientations from relative ones, in place of the input's. What the graph does not tie to most of
+// the views leaves the input: orientations of separate pieces have nothing to do with each other.
+// @return  the number of views left.
+std::size_t TakeRelativeRotations(const SolveFlags& flags, KnownRotationInput& input) {
+  constexpr double kSigmaDeg = 1.0;  // of edges that say none, as `average` has it
+  const RotationList list = ReadRotationList(flags.relative_rotations, kSigmaDeg * kRadFromDeg);
+  GlobalAveragingOptions options;
+  options.seed = flags.common.seed;
+  GlobalAveragingProblem problem;
+  problem.edges = list.edges;
+  problem.use_start = false;
+  const GlobalAveragingResult averaged =
+      AverageGlobally(problem, options, flags.common.NumThreads());
+
+  std::vector<RotationMap> pieces(averaged.component_sizes.size());
+  for (const auto& [view, cam_from_world] : averaged.cam_from_world) {
+    const std::uint64_t id = list.ids[view.value];
+    if (id > static_cast<std::uint64_t>(std::numeric_limits<int>::max())) continue;
+    const FrameId frame{static_cast<int>(id)};
+    if (!input.cam_from_world.contains(frame)) continue;
+    pieces[averaged.component.at(view)][frame] = cam_from_world;
+  }
+  const auto largest = std::max_element(
+      pieces.begin(), pieces.end(), [](const RotationMap& a, const RotationMap& b) {
+        return a.size() < b.size();
+      });
+  if (largest == pieces.end() || largest->size() < 2) {
+    throw std::runtime_error(flags.relative_rotations + ": ties no two views of " + flags.input +
+                             " together; its numbers must be those of the views there");
+  }
+  input.cam_from_world = std::move(*largest);
+  input.sigma_rad.clear();
+  std::set<FrameId> views;
+  for (const auto& [view, rotation] : input.cam_from_world) views.insert(view);
+  input.tracks = RestrictTracks(input.tracks, views, 2);
+  return views.size();
 }
 
 Trajectory PosesOf(const Reconstruction& map, const KnownRotationInput& input) {
@@ -119,6 +162,9 @@ RunSummary Summarise(const SolveFlags& flags,
   summary.options = DescribeOptions(options);
   summary.camera = input.camera;
   summary.sequence = {{"input", flags.input}, {"format", input.format}};
+  if (!flags.relative_rotations.empty()) {
+    summary.sequence.emplace_back("relative_rotations", flags.relative_rotations);
+  }
   std::int64_t observations = 0;
   for (const Track& track : input.tracks) {
     observations += static_cast<std::int64_t>(track.observations.size());
@@ -148,9 +194,14 @@ int Solve(const SolveFlags& flags) {
   options.krot.num_threads = options.ba.num_threads = flags.common.NumThreads();
 
   progress.StartStage("reading", -1);
-  const KnownRotationInput input = ReadKnownRotation(flags.input);
+  KnownRotationInput input = ReadKnownRotation(flags.input);
   progress.EndStage(input.format + ", " + std::to_string(input.cam_from_world.size()) + " views, " +
                     std::to_string(input.tracks.size()) + " tracks");
+  if (!flags.relative_rotations.empty()) {
+    progress.StartStage("averaging", -1);
+    const std::size_t num_views = TakeRelativeRotations(flags, input);
+    progress.EndStage(std::to_string(num_views) + " views have an orientation");
+  }
   const std::filesystem::path directory = PrepareRunDirectory(flags.out);
 
   progress.StartStage("known rotation", -1);
@@ -198,6 +249,11 @@ void AddSolveCommand(CLI::App& app, Action& action) {
                    "What `rotslam run` left, a COLMAP model (its positions and points are not "
                    "looked at), a BAL file, or our text form (see known_rotation.txt of a run)")
       ->required();
+  command->add_option(
+      "--relative-rotations",
+      flags->relative_rotations,
+      "Graph of relative rotations between the input's views, as `rotslam average` "
+      "takes it: orientations are averaged from these, the input's are not looked at");
   command->add_option("--out", flags->out, "Folder for the results; made where missing")
       ->required();
   AddKrotFlags(*command, flags->krot);

@@ -86,6 +86,59 @@ TEST_F(SolveTest, FindsTheSameStreetFromEveryKindOfInput) {
             ReadWholeFile(Path("out_binary") / "keyframes_tum.txt"));
 }
 
+TEST_F(SolveTest, AveragesRelativeRotations) {
+  const Scene scene = Street();
+  KnownRotationInput input;
+  input.camera = scene.camera;
+  input.tracks = scene.tracks;
+  // Orientations that would lead nowhere.
+  for (const auto& [view, rotation] : scene.cam_from_world) {
+    input.cam_from_world[view] = Rotation::Exp({0.0, 0.7 * view.value, 0.0});
+  }
+  WriteKnownRotation(Path("ours.txt"), input);
+  std::ofstream graph(Path("graph.txt"));
+  graph.precision(12);
+  for (const auto& [i, cam_i] : scene.cam_from_world) {
+    for (const auto& [j, cam_j] : scene.cam_from_world) {
+      if (j <= i || j.value > i.value + 3) continue;
+      const Eigen::Vector4d q = (cam_j * cam_i.Inverse()).Quaternion().coeffs();
+      graph << i.value << " " << j.value << " " << q.transpose() << "\n";
+    }
+  }
+  graph << "100 101 0 0 0 1\n";  // of views that are not there
+  graph.close();
+  const auto solve = [&](const std::string& name) {
+    return Rotslam({"solve",
+                    Path("ours.txt").string(),
+                    "--relative-rotations",
+                    Path(name).string(),
+                    "--out",
+                    Path("out").string()});
+  };
+  const CommandResult result = solve("graph.txt");
+  ASSERT_EQ(result.exit_code, 0) << result.error;
+  EXPECT_THAT(result.error, HasSubstr("12 views have an orientation"));
+  // The world is turned: distances of centres tell.
+  std::vector<StampedPose> poses = ReadTrajectory(Path("out") / "keyframes_tum.txt");
+  ASSERT_EQ(poses.size(), scene.true_center_in_world.size());
+  const auto length = [](const Eigen::Vector3d& a, const Eigen::Vector3d& b) {
+    return (a - b).norm();
+  };
+  const auto& truth = scene.true_center_in_world;
+  const double scale = length(poses.back().center_in_world, poses.front().center_in_world) /
+                       length(truth.rbegin()->second, truth.begin()->second);
+  for (std::size_t k = 1; k < poses.size(); ++k) {
+    const int view = static_cast<int>(poses[k].timestamp_s);
+    EXPECT_NEAR(length(poses[k].center_in_world, poses[0].center_in_world) / scale,
+                length(truth.at(FrameId{view}), truth.begin()->second),
+                0.05);
+  }
+  std::ofstream(Path("far.txt")) << "100 101 0 0 0 1\n";
+  const CommandResult far = solve("far.txt");
+  EXPECT_EQ(far.exit_code, 1);
+  EXPECT_THAT(far.error, HasSubstr("ties no two views"));
+}
+
 TEST_F(SolveTest, TakesTheStartThatIsAskedForAndLeavesTheCertificateOut) {
   WriteColmapText(Path("model"), Street());
   for (const char* start : {"l1", "bisection", "linear"}) {
