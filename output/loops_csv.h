@@ -18,7 +18,7 @@ struct LoopRow {
   double scaled_angle_deg = 0.0;
 };
 
-/// loops.csv: `frame,match,score,inliers,angle_deg,turn_scale,scaled_angle_deg,accepted`, one line
+/// loops.csv: `frame,match,score,inliers,angle_deg,accepted,turn_scale,scaled_angle_deg`, one line
 /// per row; accepted is 1 or 0. Throws std::invalid_argument for a number that is not finite,
 /// std::runtime_error when the file cannot be written; never leaves half a file.
 void WriteLoopsCsv(const std::filesystem::path& path, const std::vector<LoopRow>& rows);
