@@ -60,7 +60,7 @@ void WarnOfTurnScale(const std::vector<LoopCheck>& loops, Progress& progress) {
   for (const LoopCheck& loop : loops) {
     if (loop.accepted && loop.way.turn_scale != 1.0) scales.push_back(loop.way.turn_scale);
   }
-  const double scale = Median(std::move(scales), 1.0);
+  const double scale = Median(scales, 1.0);
   if (std::abs(scale - 1.0) < kNotable) return;
   std::array<char, 160> text = {};
   std::snprintf(text.data(),
