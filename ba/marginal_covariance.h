@@ -16,7 +16,7 @@ namespace rotslam {
 /// @return  one matrix per group, in the blocks' tangent spaces, one block after the other; nullopt
 ///          when the residuals leave something open. Same bytes every time, which Ceres' own
 ///          covariance does not promise.
-/// Error:   equals Ceres' covariance to 1e-6 of its size (ba tests).
+/// Error:   equals the inverse of the whole J^T J to 1e-6 of its size (ba tests).
 /// Cost:    squared number of blocks in each eliminated block's residuals to assemble; then a
 /// sparse
 ///          Cholesky of the remaining blocks and one solve per asked dimension.
