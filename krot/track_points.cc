@@ -59,11 +59,11 @@ std::vector<Track> CleanTracks(const std::vector<Track>& tracks,
 }
 
 TriangulatedTracks TriangulateAll(const RotationMap& cam_from_world,
-                           const CenterMap& centers,
-                           const std::vector<Track>& tracks,
-                           const std::vector<double>& thresholds,
-                           const KrotOptions& options,
-                           const KrotUnits& units) {
+                                  const CenterMap& centers,
+                                  const std::vector<Track>& tracks,
+                                  const std::vector<double>& thresholds,
+                                  const KrotOptions& options,
+                                  const KrotUnits& units) {
   TriangulatedTracks points(tracks.size());
   ParallelFor(static_cast<int>(tracks.size()), options.num_threads, [&](int t) {
     std::vector<int> observations;
