@@ -83,10 +83,12 @@ class LiveCounters {
     num_loops_ += std::count_if(estimate.loops.begin(),
                                 estimate.loops.end(),
                                 [](const LoopCheck& check) { return check.accepted; });
-    // Looking for them takes time in proportion to what has been read.
+    // A look takes time in proportion to what has been read: rarer and rarer, so that all of them
+    // together do, too.
     constexpr int kFramesBetweenLooks = 30;
-    if (estimate.frame.value % kFramesBetweenLooks == kFramesBetweenLooks - 1) {
+    if (estimate.frame.value >= next_look_) {
       num_segments_ = CountSegments(result);
+      next_look_ = estimate.frame.value + std::max(kFramesBetweenLooks, estimate.frame.value / 10);
     }
     return {std::to_string(estimate.report.num_inliers) + " inliers",
             Counted(num_loops_, "loop"),
@@ -113,6 +115,7 @@ class LiveCounters {
   HeldStretchOptions held_;
   std::int64_t num_loops_ = 0;
   std::int64_t num_segments_ = 1;
+  int next_look_ = 29;
 };
 
 void TellDetails(const LoopedEstimate& estimate, Progress& progress) {
