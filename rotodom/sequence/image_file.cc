@@ -1,0 +1,160 @@
+#include "rotodom/sequence/image_file.h"
+
+#include <algorithm>
+#include <array>
+#include <cstddef>
+#include <cstdint>
+#include <fstream>
+#include <iterator>
+#include <system_error>
+#include <utility>
+#include <vector>
+
+#include <opencv2/core.hpp>
+#include <opencv2/imgcodecs.hpp>
+#include <opencv2/imgproc.hpp>
+
+namespace rotslam {
+namespace {
+
+using Bytes = std::vector<unsigned char>;
+
+// Big-endian; the caller has checked that they are there.
+std::uint32_t Number16At(const Bytes& bytes, std::size_t at) {
+  return std::uint32_t{bytes[at]} << 8 | std::uint32_t{bytes[at + 1]};
+}
+std::uint32_t Number32At(const Bytes& bytes, std::size_t at) {
+  return Number16At(bytes, at) << 16 | Number16At(bytes, at + 2);
+}
+
+// ---- JPEG
+
+bool IsJpeg(const Bytes& bytes) {
+  return bytes.size() >= 4 && bytes[0] == 0xff && bytes[1] == 0xd8;
+}
+
+// Pixels that the first frame header claims, where its entropy code is Huffman's; else 0.
+std::uint64_t ClaimedPixelsOfJpeg(const Bytes& bytes) {
+  // A segment: 0xff, its kind, two bytes of length that count themselves.
+  for (std::size_t at = 2; at + 9 <= bytes.size() && bytes[at] == 0xff;) {
+    const unsigned char kind = bytes[at + 1];
+    if (kind >= 0xc0 && kind <= 0xc2) {
+      return std::uint64_t{Number16At(bytes, at + 5)} * Number16At(bytes, at + 7);
+    }
+    at += 2 + Number16At(bytes, at + 2);
+  }
+  return 0;
+}
+
+// A file that ends before its end marker decodes to grey below the break. The marker must come
+// behind the start of the last scan: a thumbnail in the header has markers of its own.
+bool IsCutOffJpeg(const Bytes& bytes) {
+  constexpr unsigned char kScan[] = {0xff, 0xda};
+  constexpr unsigned char kEnd[] = {0xff, 0xd9};
+  const auto scan = std::find_end(bytes.begin(), bytes.end(), std::begin(kScan), std::end(kScan));
+  if (std::search(scan, bytes.end(), std::begin(kEnd), std::end(kEnd)) == bytes.end()) return true;
+  // Each block of 8 x 8 pixels has a bit at least, which says that it is like the one before.
+  constexpr std::uint64_t kMostPixelsPerByte = 8 * 64;
+  return ClaimedPixelsOfJpeg(bytes) > kMostPixelsPerByte * bytes.size();
+}
+
+// ---- PNG
+
+// CRC-32 of PNG, gzip and Ethernet, bit by bit through a table.
+std::uint32_t Crc32(const unsigned char* begin, const unsigned char* end) {
+  static const std::array<std::uint32_t, 256> table = [] {
+    std::array<std::uint32_t, 256> entries;
+    for (std::uint32_t byte = 0; byte < 256; ++byte) {
+      std::uint32_t value = byte;
+      for (int bit = 0; bit < 8; ++bit) value = (value >> 1) ^ ((value & 1) != 0 ? 0xedb88320 : 0);
+      entries[byte] = value;
+    }
+    return entries;
+  }();
+  std::uint32_t crc = 0xffffffff;
+  for (; begin != end; ++begin) crc = (crc >> 8) ^ table[(crc ^ *begin) & 0xff];
+  return ~crc;
+}
+
+// Bytes of the pixels that a header chunk (IHDR) of 13 bytes at `at` claims, at least.
+std::uint64_t ClaimedBytesOfPng(const Bytes& bytes, std::size_t at) {
+  constexpr std::array<std::uint64_t, 7> kChannels = {1, 1, 3, 1, 2, 1, 4};  // by colour type
+  const std::uint64_t pixels =
+      std::uint64_t{Number32At(bytes, at) & 0x7fffffff} * (Number32At(bytes, at + 4) & 0x7fffffff);
+  const std::uint64_t bits = bytes[at + 8] * kChannels[bytes[at + 9] % kChannels.size()];
+  return pixels / 8 * std::min<std::uint64_t>(bits, 64);
+}
+
+// What is wrong with the chunks of a PNG file; empty when nothing is, or when it is no PNG file.
+// The decoder takes damaged pixels for good ones, and complains on stderr by itself.
+std::string DamageOfPng(const Bytes& bytes) {
+  constexpr unsigned char kSignature[] = {0x89, 'P', 'N', 'G', '\r', '\n', 0x1a, '\n'};
+  constexpr unsigned char kHeader[] = {'I', 'H', 'D', 'R'};
+  constexpr unsigned char kEnd[] = {'I', 'E', 'N', 'D'};
+  constexpr std::uint64_t kMostBytesPerByte = 1032;  // that deflate can make
+  if (bytes.size() < 8 || !std::equal(kSignature, kSignature + 8, bytes.begin())) return {};
+  // A chunk is its length, type, that many bytes, and the CRC of type and bytes.
+  for (std::size_t at = 8; at + 12 <= bytes.size();) {
+    const std::size_t length = Number32At(bytes, at);
+    if (length > bytes.size() - at - 12) break;
+    const unsigned char* type = bytes.data() + at + 4;
+    const bool is_critical = (type[0] & 0x20) == 0;
+    if (is_critical && Crc32(type, type + 4 + length) != Number32At(bytes, at + 8 + length)) {
+      return "PNG data are damaged (checksum)";
+    }
+    if (std::equal(kHeader, kHeader + 4, type) && length >= 13 &&
+        ClaimedBytesOfPng(bytes, at + 8) > kMostBytesPerByte * bytes.size()) {
+      break;
+    }
+    if (std::equal(kEnd, kEnd + 4, type)) return {};
+    at += 12 + length;
+  }
+  return "PNG data are cut off";
+}
+
+// ---- any
+
+DecodedImage Failed(std::string problem) { return {{}, std::move(problem)}; }
+
+}  // namespace
+
+DecodedImage ToEightBits(cv::Mat image) {
+  if (image.channels() == 4) cv::cvtColor(image, image, cv::COLOR_BGRA2BGR);
+  if (image.depth() == CV_16U) {
+    cv::Mat scaled;
+    image.convertTo(scaled, CV_8U, 255.0 / 65535.0);
+    image = scaled;
+  }
+  if (image.depth() == CV_8U && (image.channels() == 1 || image.channels() == 3)) {
+    return {std::move(image), {}};
+  }
+  return Failed("pixels are neither 8 nor 16 bits, or not of 1, 3 or 4 channels");
+}
+
+DecodedImage ReadImageFile(const std::filesystem::path& file) {
+  // A folder can be opened, too, and then says that it is of 2^63 bytes.
+  std::error_code error;
+  if (!std::filesystem::is_regular_file(file, error)) return Failed("file cannot be opened");
+  std::ifstream stream(file, std::ios::binary | std::ios::ate);
+  Bytes bytes;
+  if (const std::streamoff size = stream.tellg(); size > 0) {
+    bytes.resize(static_cast<std::size_t>(size));
+    stream.seekg(0);
+    stream.read(reinterpret_cast<char*>(bytes.data()), size);
+  }
+  if (!stream.is_open() || stream.bad()) return Failed("file cannot be opened");
+  if (bytes.empty()) return Failed("file is empty");
+  if (IsJpeg(bytes) && IsCutOffJpeg(bytes)) return Failed("JPEG data are cut off");
+  if (std::string damage = DamageOfPng(bytes); !damage.empty()) return Failed(std::move(damage));
+  cv::Mat image;
+  try {
+    image = cv::imdecode(bytes,
+                         cv::IMREAD_ANYCOLOR | cv::IMREAD_ANYDEPTH | cv::IMREAD_IGNORE_ORIENTATION);
+  } catch (const cv::Exception&) {
+    image.release();  // such as a header that claims a size beyond OpenCV's limit
+  }
+  if (image.empty()) return Failed("image cannot be decoded");
+  return ToEightBits(std::move(image));
+}
+
+}  // namespace rotslam

@@ -1,0 +1,77 @@
+// Trajectories, orientations, pose graphs and models, our own and other people's.
+
+#include "output/colmap_model.h"
+#include "output/g2o.h"
+#include "output/known_rotation_file.h"
+#include "output/metrics.h"
+#include "output/orientation_file.h"
+#include "output/rotation_list.h"
+#include "output/trajectory.h"
+#include "tests/fuzz/fuzz_target.h"
+
+namespace rotslam {
+namespace {
+
+namespace fs = std::filesystem;
+
+const RegisterFuzzTarget trajectory(
+    "trajectory", [](std::string_view bytes, const TemporaryFolder& folder) {
+      const std::vector<std::string> files = CutIntoFiles(bytes, 2);
+      const fs::path poses = folder.Write("poses.txt", files[0]);
+      const Trajectory read = files[1].empty()
+                                  ? ReadTrajectory(poses)
+                                  : ReadTrajectory(poses, folder.Write("times.txt", files[1]));
+      WriteTumTrajectory(folder.path() / "copy.txt", read);
+      const std::vector<PosePair> pairs = AssociatePoses(read, read, {});
+      if (pairs.size() >= 3) ComputeMetrics(pairs, {});
+    });
+
+const RegisterFuzzTarget orientations("orientations",
+                                      [](std::string_view bytes, const TemporaryFolder& folder) {
+                                        ReadOrientations(
+                                            folder.Write("rotations", std::string(bytes)));
+                                      });
+
+const RegisterFuzzTarget g2o("g2o", [](std::string_view bytes, const TemporaryFolder& folder) {
+  ReadG2o(folder.Write("graph.g2o", std::string(bytes)));
+});
+
+const RegisterFuzzTarget rotation_list("rotation_list",
+                                       [](std::string_view bytes, const TemporaryFolder& folder) {
+                                         const RotationList list = ReadRotationList(
+                                             folder.Write("graph", std::string(bytes)), 0.01);
+                                         RotationMap all = list.cam_from_world;
+                                         for (std::size_t k = 0; k < list.ids.size(); ++k)
+                                           all[FrameId{static_cast<int>(k)}];
+                                         WriteRotationList(folder.path() / "copy.g2o", list, all);
+                                       });
+
+const RegisterFuzzTarget known_rotation("known_rotation",
+                                        [](std::string_view bytes, const TemporaryFolder& folder) {
+                                          const KnownRotationInput read = ReadKnownRotation(
+                                              folder.Write("problem.txt", std::string(bytes)));
+                                          WriteKnownRotation(folder.path() / "copy.txt", read);
+                                        });
+
+void ReadColmap(std::string_view bytes, const TemporaryFolder& folder, const char* ending) {
+  const std::vector<std::string> files = CutIntoFiles(bytes, 3);
+  const std::string name = std::string("colmap_") + ending + "/";
+  fs::create_directory(folder.path() / name);
+  folder.Write(name + "cameras." + ending, files[0]);
+  folder.Write(name + "images." + ending, files[1]);
+  folder.Write(name + "points3D." + ending, files[2]);
+  ReadColmapModel(folder.path() / name);
+}
+
+const RegisterFuzzTarget colmap_text("colmap_text",
+                                     [](std::string_view bytes, const TemporaryFolder& folder) {
+                                       ReadColmap(bytes, folder, "txt");
+                                     });
+
+const RegisterFuzzTarget colmap_binary("colmap_binary",
+                                       [](std::string_view bytes, const TemporaryFolder& folder) {
+                                         ReadColmap(bytes, folder, "bin");
+                                       });
+
+}  // namespace
+}  // namespace rotslam
