@@ -1,0 +1,35 @@
+#pragma once
+
+#include <optional>
+
+#include "rotodom/loop/loop_closure.h"
+#include "rotodom/odometry_archive.h"
+
+namespace rotslam {
+
+template <class Archive>
+void TransferValue(Archive& archive, LoopCheck& check) {
+  auto& [frame, match, score, num_inliers, angle_deg, way, accepted] = check;
+  auto& [turn_scale, scaled_angle_deg] = way;
+  archive(frame, match, score, num_inliers, angle_deg, turn_scale, scaled_angle_deg, accepted);
+}
+
+template <class Archive>
+void TransferValue(Archive& archive, LoopReport& report) {
+  auto& [checks, connections] = report;
+  archive(checks, connections);
+}
+
+/// One frame as AddFrame found it: to take it again without its image.
+struct FrameRecord {
+  FrameEstimate estimate;           // as the odometry says it, in its own world
+  std::optional<Features> corners;  // described, where the frame is to be a place
+  LoopReport loops;                 // what became of the frame before
+
+  template <class Archive>
+  void Transfer(Archive& archive) {
+    archive(estimate, corners, loops);
+  }
+};
+
+}  // namespace rotslam
