@@ -1,0 +1,109 @@
+#include <algorithm>
+#include <optional>
+#include <stdexcept>
+#include <string>
+#include <vector>
+
+#include <opencv2/core.hpp>
+#include <pybind11/stl.h>
+
+#include "apps/python/arrays.h"
+#include "apps/python/module.h"
+#include "rotodom/camera/read_camera.h"
+#include "rotodom/sequence/sequence.h"
+
+namespace py = pybind11;
+using namespace py::literals;  // NOLINT(google-build-using-namespace): "name"_a
+
+namespace rotslam {
+namespace {
+
+Camera MakeCamera(double fx,
+                  double fy,
+                  double cx,
+                  double cy,
+                  int width,
+                  int height,
+                  const std::string& model,
+                  const std::vector<double>& distortion,
+                  double readout_s) {
+  Camera camera;
+  bool is_known = false;
+  for (const CameraModel known :
+       {CameraModel::kPinhole, CameraModel::kRadtan, CameraModel::kEquidistant}) {
+    if (model != Name(known)) continue;
+    camera.model = known;
+    is_known = true;
+  }
+  if (!is_known) {
+    throw std::invalid_argument("model is \"" + model +
+                                "\", must be pinhole, radtan or equidistant");
+  }
+  if (distortion.size() > camera.distortion.size()) {
+    throw std::invalid_argument("distortion has " + std::to_string(distortion.size()) +
+                                " numbers, must be at most 5");
+  }
+  std::copy(distortion.begin(), distortion.end(), camera.distortion.begin());
+  camera.fx = fx;
+  camera.fy = fy;
+  camera.cx = cx;
+  camera.cy = cy;
+  camera.width = width;
+  camera.height = height;
+  camera.readout_s = readout_s;
+  if (const auto problem = camera.Problem()) throw std::invalid_argument(*problem);
+  return camera;
+}
+
+Camera ReadCameraFor(const py::object& path,
+                     const std::optional<int>& width,
+                     const std::optional<int>& height) {
+  const Camera camera = ReadCamera(PathOf(path));
+  if (width.has_value() != height.has_value()) {
+    throw std::invalid_argument("width and height go together");
+  }
+  return width ? MatchToImages(camera, cv::Size(*width, *height)) : camera;
+}
+
+}  // namespace
+
+void AddCamera(py::module_& module) {
+  py::class_<Camera>(module, "Camera", R"(A calibrated camera: x right, y down, z forward.
+
+Lengths in pixels, pixel centres at integer coordinates. model is "pinhole", "radtan" (OpenCV:
+k1 k2 p1 p2 k3) or "equidistant" (k1 k2 k3 k4). readout_s: rolling shutter, seconds from the
+first row to the last; 0 for a global one.)")
+      .def(py::init(&MakeCamera),
+           "fx"_a,
+           "fy"_a,
+           "cx"_a,
+           "cy"_a,
+           "width"_a,
+           "height"_a,
+           "model"_a = "pinhole",
+           "distortion"_a = std::vector<double>(),
+           "readout_s"_a = 0.0)
+      .def_readonly("fx", &Camera::fx)
+      .def_readonly("fy", &Camera::fy)
+      .def_readonly("cx", &Camera::cx)
+      .def_readonly("cy", &Camera::cy)
+      .def_readonly("width", &Camera::width)
+      .def_readonly("height", &Camera::height)
+      .def_readonly("distortion", &Camera::distortion)
+      .def_readonly("readout_s", &Camera::readout_s)
+      .def_property_readonly("model", [](const Camera& camera) { return Name(camera.model); })
+      .def("__repr__",
+           [](const Camera& camera) { return "<rotslam.Camera " + Describe(camera) + ">"; });
+  module.def(
+      "read_camera",
+      &ReadCameraFor,
+      "path"_a,
+      "width"_a = py::none(),
+      "height"_a = py::none(),
+      R"(The camera of a calibration file: our YAML, ORB-SLAM, Kalibr, KITTI, EuRoC or COLMAP.
+
+width, height: of the images, for files that do not say; a file that says otherwise is refused.
+Raises RuntimeError in one line that names file and key.)");
+}
+
+}  // namespace rotslam

@@ -1,0 +1,110 @@
+#include "apps/evaluation.h"
+
+#include <filesystem>
+#include <optional>
+#include <stdexcept>
+#include <string>
+#include <vector>
+
+#include <nlohmann/json.hpp>
+#include <pybind11/stl.h>
+
+#include "apps/python/arrays.h"
+#include "apps/python/module.h"
+#include "output/trajectory.h"
+
+namespace py = pybind11;
+using namespace py::literals;  // NOLINT(google-build-using-namespace): "name"_a
+
+namespace rotslam {
+namespace {
+
+struct NamedTrajectory {
+  Trajectory trajectory;
+  std::string name;
+};
+
+NamedTrajectory TrajectoryFrom(const char* argument,
+                               const py::object& object,
+                               const std::optional<std::filesystem::path>& times) {
+  if (py::isinstance<py::str>(object) || py::hasattr(object, "__fspath__")) {
+    const std::string path = PathOf(object);
+    return {ReadTrajectory(path, times), path};
+  }
+  const DoubleArray rows = Numbers(argument,
+                                   "a file or an array of numbers [n, 8], n lines of a TUM "
+                                   "trajectory (timestamp tx ty tz qx qy qz qw)",
+                                   object,
+                                   {-1, 8});
+  NamedTrajectory result{{}, argument};
+  const auto at = rows.unchecked<2>();
+  for (py::ssize_t k = 0; k < at.shape(0); ++k) {
+    if (k > 0 && !(at(k, 0) >= at(k - 1, 0))) {
+      throw std::invalid_argument(std::string(argument) + ": timestamps must ascend, row " +
+                                  std::to_string(k) + " does not");
+    }
+    StampedPose pose;
+    pose.timestamp_s = at(k, 0);
+    pose.center_in_world = {at(k, 1), at(k, 2), at(k, 3)};
+    pose.world_from_cam = Rotation(Eigen::Quaterniond(at(k, 7), at(k, 4), at(k, 5), at(k, 6)));
+    if (!pose.center_in_world.allFinite()) {
+      throw std::invalid_argument(std::string(argument) + ": a position is not finite, row " +
+                                  std::to_string(k));
+    }
+    result.trajectory.push_back(pose);
+  }
+  return result;
+}
+
+py::object EvaluateTrajectory(const py::object& ground_truth,
+                              const py::object& estimate,
+                              const py::object& times,
+                              double max_gap_s,
+                              int images,
+                              int threads) {
+  MetricsOptions options;
+  options.max_gap_s = max_gap_s;
+  options.num_threads = threads;
+  if (const auto problem = options.Problem()) throw std::invalid_argument(*problem);
+  if (images < 0) {
+    throw std::invalid_argument("images is " + std::to_string(images) + ", must be 0 or more");
+  }
+  std::optional<std::filesystem::path> times_file;
+  if (!times.is_none()) times_file = PathOf(times);
+  const NamedTrajectory truth = TrajectoryFrom("ground_truth", ground_truth, times_file);
+  const NamedTrajectory found = TrajectoryFrom("estimate", estimate, times_file);
+  std::string metrics;
+  {
+    const py::gil_scoped_release unlocked;
+    metrics = MetricsJson(CompareTrajectories(
+                              truth.trajectory, truth.name, found.trajectory, found.name, options),
+                          images)
+                  .dump();
+  }
+  return py::module_::import("json").attr("loads")(metrics);
+}
+
+}  // namespace
+
+void AddEvaluation(py::module_& module) {
+  module.def("evaluate",
+             &EvaluateTrajectory,
+             "ground_truth"_a,
+             "estimate"_a,
+             "times"_a = py::none(),
+             "max_gap_s"_a = MetricsOptions{}.max_gap_s,
+             "images"_a = 0,
+             "threads"_a = 1,
+             R"(How far a trajectory is from the truth: the numbers of `rotslam eval --json`.
+
+ground_truth, estimate: TUM or KITTI files, or [n, 8] arrays with the columns of TUM (timestamp
+                        tx ty tz qx qy qz qw, camera->world), timestamps ascending.
+times:     file with timestamps of KITTI files.
+max_gap_s: largest gap in the ground truth to interpolate over.
+images:    images of the sequence, for the coverage; 0: no coverage.
+Returns a dict: n, images, coverage, rpe1, rpe1_median, rpe1_p90, rpe1_max, rpen (deg), r_err (deg
+per 100 m), ate, scale, path_length; None where a number is not defined. Raises RuntimeError where
+files cannot be read or fewer than three poses have ground truth. C++: output/metrics.h.)");
+}
+
+}  // namespace rotslam

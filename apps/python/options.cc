@@ -1,0 +1,75 @@
+#include "apps/python/options.h"
+
+#include <algorithm>
+#include <type_traits>
+#include <variant>
+
+namespace py = pybind11;
+
+namespace rotslam {
+namespace {
+
+template <class Field>
+void Assign(const std::string& key, const py::handle& value, Field& field) {
+  const bool is_bool = py::isinstance<py::bool_>(value);
+  const bool is_int = py::isinstance<py::int_>(value) && !is_bool;
+  bool fits = is_int;
+  const char* expected = "a whole number";
+  if constexpr (std::is_same_v<Field, bool>) {
+    fits = is_bool;
+    expected = "True or False";
+  } else if constexpr (std::is_same_v<Field, double>) {
+    fits = is_int || py::isinstance<py::float_>(value);
+    expected = "a number";
+  } else if constexpr (std::is_same_v<Field, std::string>) {
+    fits = py::isinstance<py::str>(value);
+    expected = "text";
+  }
+  try {
+    if (fits) {
+      field = value.cast<Field>();
+      return;
+    }
+  } catch (const py::cast_error&) {  // does not fit into the field
+  }
+  throw std::invalid_argument("\"" + key + "\" expects " + expected + ", found " +
+                              std::string(py::repr(value)));
+}
+
+void OverrideGroup(const py::dict& given,
+                   const std::string& prefix,
+                   const std::vector<OptionRef>& options) {
+  for (const auto& [name, value] : given) {
+    const std::string key = prefix + std::string(py::str(name));
+    if (py::isinstance<py::dict>(value)) {
+      OverrideGroup(py::reinterpret_borrow<py::dict>(value), key + ".", options);
+      continue;
+    }
+    bool found = false;
+    for (const OptionRef& option : options) {
+      if (option.key != key) continue;
+      found = true;
+      std::visit([&, v = value](auto* field) { Assign(key, v, *field); }, option.field);
+    }
+    if (found) continue;
+    const bool is_group = std::any_of(options.begin(), options.end(), [&](const OptionRef& option) {
+      return option.key.starts_with(key + ".");
+    });
+    throw std::invalid_argument(is_group ? "\"" + key + "\" is a group of options, found " +
+                                               std::string(py::repr(value))
+                                         : UnknownOption(key, options));
+  }
+}
+
+}  // namespace
+
+void OverrideOptions(const py::dict& given, const std::vector<OptionRef>& options) {
+  OverrideGroup(given, "", options);
+}
+
+void CheckThreads(int threads) {
+  if (threads >= 1) return;
+  throw std::invalid_argument("threads is " + std::to_string(threads) + ", must be 1 or more");
+}
+
+}  // namespace rotslam

@@ -1,0 +1,102 @@
+#include "rotodom/sequence/sequence.h"
+
+#include <cstdint>
+#include <memory>
+#include <mutex>
+#include <optional>
+#include <stdexcept>
+#include <string>
+#include <vector>
+
+#include <opencv2/core.hpp>
+#include <pybind11/stl.h>
+
+#include "apps/python/arrays.h"
+#include "apps/python/module.h"
+#include "rotodom/camera/read_camera.h"
+
+namespace py = pybind11;
+using namespace py::literals;  // NOLINT(google-build-using-namespace): "name"_a
+
+namespace rotslam {
+namespace {
+
+py::object ArrayOfImage(const cv::Mat& image) {
+  if (image.empty()) return py::none();
+  std::vector<py::ssize_t> shape = {image.rows, image.cols};
+  if (image.channels() > 1) shape.push_back(image.channels());
+  py::array_t<std::uint8_t> array(shape);
+  const cv::Mat target(image.rows, image.cols, image.type(), array.mutable_data());
+  image.copyTo(target);
+  return array;
+}
+
+class PySequence {
+ public:
+  PySequence(const py::object& path, int first, int last, int stride, double fps) {
+    SequenceOptions options;
+    options.first = first;
+    options.last = last;
+    options.stride = stride;
+    options.fps = fps;
+    if (const auto problem = options.Problem()) throw std::invalid_argument(*problem);
+    sequence_ = OpenSequence(PathOf(path), options);
+  }
+
+  py::tuple Next() {
+    std::optional<Frame> frame;
+    {
+      const py::gil_scoped_release unlocked;
+      const std::lock_guard lock(mutex_);
+      frame = sequence_->Next();
+    }
+    if (!frame) throw py::stop_iteration();
+    return py::make_tuple(ArrayOfImage(frame->image), frame->timestamp_s);
+  }
+
+  int NumFrames() const { return sequence_->NumFrames(); }
+
+  std::optional<Camera> OwnCamera() const {
+    const auto& file = sequence_->CameraFile();
+    if (!file) return std::nullopt;
+    return MatchToImages(ReadCamera(*file), sequence_->image_size());
+  }
+
+  std::optional<std::string> GroundTruth() const {
+    const auto& file = sequence_->GroundTruthFile();
+    if (!file) return std::nullopt;
+    return file->string();
+  }
+
+ private:
+  std::mutex mutex_;
+  std::unique_ptr<Sequence> sequence_;
+};
+
+}  // namespace
+
+void AddSequence(py::module_& module) {
+  py::class_<PySequence>(module, "Sequence", R"(The frames of a sequence, each once.
+
+path is an image folder, a KITTI odometry, TUM RGB-D or EuRoC sequence, or a video. Iterating
+gives (image, timestamp): uint8 [height, width] or [height, width, 3] (BGR), None where it cannot
+be read; seconds. fps is for input without timestamps. Raises RuntimeError where there is no such
+sequence, ValueError for options out of range.)")
+      .def(py::init<const py::object&, int, int, int, double>(),
+           "path"_a,
+           "first"_a = SequenceOptions{}.first,
+           "last"_a = SequenceOptions{}.last,
+           "stride"_a = SequenceOptions{}.stride,
+           "fps"_a = SequenceOptions{}.fps)
+      .def("__iter__", [](const py::object& self) { return self; })
+      .def("__next__", &PySequence::Next)
+      .def_property_readonly(
+          "num_frames", &PySequence::NumFrames, "Frames in all; -1 where a video does not say.")
+      .def_property_readonly(
+          "camera", &PySequence::OwnCamera, "The calibration that lies with the images, or None.")
+      .def_property_readonly("ground_truth",
+                             &PySequence::GroundTruth,
+                             "File of the trajectory that lies with the images, or None.");
+}
+
+}  // namespace rotslam
