@@ -20,6 +20,7 @@ struct Checkerboard {
 /// Corners of one image, row by row, px.
 using BoardCorners = std::vector<cv::Point2f>;
 
+/// Which boards a calibration uses.
 struct BoardCalibrationOptions {
   // Fewer boards cannot tell the lens from the boards' poses.
   int min_boards = 5;

@@ -56,7 +56,9 @@ struct Vocabulary {
     }
   }
 
-  std::string Nearest(const std::string& key) const {
+  std::string Nearest(const std::string& whole_key) const {
+    // No option is that long, and the time goes with the length.
+    const std::string key = whole_key.substr(0, 100);
     std::vector<std::string> candidates = keys;
     candidates.insert(candidates.end(), groups.begin(), groups.end());
     const auto nearest = std::min_element(

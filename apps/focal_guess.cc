@@ -3,7 +3,9 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <cstdint>
 #include <cstdio>
+#include <limits>
 #include <memory>
 
 #include <libexif/exif-data.h>
@@ -32,8 +34,11 @@ PipelineOptions FirstPass(PipelineOptions options) {
   options.loop.use_loops = false;
   options.krot.use_bracket = options.krot.start == "bisection";
   FreeFocal(options.ba.lens);
-  const int last = options.sequence.first + (kFirstPassFrames - 1) * options.sequence.stride;
-  options.sequence.last = options.sequence.last < 0 ? last : std::min(options.sequence.last, last);
+  const std::int64_t last =
+      options.sequence.first + (kFirstPassFrames - 1) * std::int64_t{options.sequence.stride};
+  const int end =
+      options.sequence.last < 0 ? std::numeric_limits<int>::max() : options.sequence.last;
+  options.sequence.last = static_cast<int>(std::min<std::int64_t>(last, end));
   return options;
 }
 
@@ -109,13 +114,14 @@ void RefineGuess(const InputFlags& flags,
     const LastWords last_words(interruption, [&] { progress.Warn(end); });
     return FindPositions(orientations, part.camera, first_pass, common.NumThreads(), progress);
   }();
-  if (!positions.bundles.empty()) {
+  const bool is_told = positions.camera.fx != part.camera.fx;
+  if (is_told) {
     guess.focal_px = positions.camera.fx;
     input.camera = CameraOf(guess, input.sequence->image_size());
   }
-  progress.Say(positions.bundles.empty()
-                   ? "first pass: no positions, the guess stands"
-                   : "first pass: focal length " + Pixels(guess.focal_px) + "; now from the start");
+  progress.Say(is_told
+                   ? "first pass: focal length " + Pixels(guess.focal_px) + "; now from the start"
+                   : std::string("first pass: nothing tells the focal length, the guess stands"));
 }
 
 std::string WarningOf(const FocalGuess& guess, const Camera& refined) {

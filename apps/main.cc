@@ -1,3 +1,4 @@
+#include <csignal>
 #include <cstdlib>
 #include <exception>
 #include <string>
@@ -42,6 +43,8 @@ int main(int argc, char** argv) {
     // FFmpeg writes to stderr by itself what we report in our own words; -8 is its "quiet".
     // No thread runs yet.
     setenv("OPENCV_FFMPEG_LOGLEVEL", "-8", 0);  // NOLINT(concurrency-mt-unsafe)
+    // A file beyond a limit on sizes is a disk that is full: an error of the write, not the end.
+    std::signal(SIGXFSZ, SIG_IGN);
     // Ceres warns of steps that it then takes otherwise; what matters is in our own results.
     FLAGS_minloglevel = google::GLOG_ERROR;
     // Our stages bring their own threads; OpenCV's pool under them only gets in the way.

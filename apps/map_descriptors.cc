@@ -3,26 +3,18 @@
 #include <algorithm>
 #include <cmath>
 #include <stdexcept>
-#include <system_error>
-
-#include <opencv2/imgcodecs.hpp>
 
 #include "output/map_keypoints.h"
 #include "rotodom/features/features.h"
+#include "rotodom/sequence/image_file.h"
 
 namespace rotslam {
 namespace {
 
 cv::Mat ReadGrey(const std::filesystem::path& file, const Camera& camera) {
-  // Of a missing file OpenCV complains by itself.
-  std::error_code error;
-  const bool is_there = std::filesystem::is_regular_file(file, error);
-  const cv::Mat image =
-      is_there ? cv::imread(file.string(), cv::IMREAD_COLOR | cv::IMREAD_IGNORE_ORIENTATION)
-               : cv::Mat();
+  const auto [image, problem] = ReadImageFile(file);
   if (image.empty()) {
-    throw std::runtime_error(file.string() +
-                             ": no such image, or it cannot be read; --images names the folder");
+    throw std::runtime_error(file.string() + ": " + problem + "; --images names the folder");
   }
   if (image.cols != camera.width || image.rows != camera.height) {
     throw std::runtime_error(file.string() + ": is " + std::to_string(image.cols) + "x" +

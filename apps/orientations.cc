@@ -9,6 +9,8 @@
 #include <stdexcept>
 #include <utility>
 
+#include "apps/frame_stream.h"
+#include "rotodom/types/disjoint_sets.h"
 #include "rotodom/types/median.h"
 
 namespace rotslam {
@@ -38,16 +40,15 @@ void InterpolateUnconnected(const Orientations& orientations, RotationMap& rotat
 
 namespace {
 
+// The first frame of every piece of the view-graph but the first.
 std::vector<FrameId> FindBreaks(const ViewGraph& graph, const RotationMap& rotations) {
+  DisjointSets pieces;
+  for (const RelativeRotation& edge : graph.edges()) pieces.Join(edge.i.value, edge.j.value);
   std::vector<FrameId> breaks;
   bool is_first = true;
   for (const auto& [frame, rotation] : rotations) {
-    const std::vector<int>& edges = graph.EdgesOf(frame);
-    if (edges.empty()) continue;
-    const bool reaches_back = std::any_of(edges.begin(), edges.end(), [&, f = frame](int index) {
-      return graph.edges()[index].i < f;
-    });
-    if (!reaches_back && !is_first) breaks.push_back(frame);
+    if (graph.EdgesOf(frame).empty()) continue;
+    if (pieces.Find(frame.value) == frame.value && !is_first) breaks.push_back(frame);
     is_first = false;
   }
   return breaks;
@@ -142,7 +143,8 @@ Orientations FindOrientations(Input& input,
                               bool keep_features,
                               const CommonFlags& flags,
                               const Interruption& interruption,
-                              Progress& progress) {
+                              Progress& progress,
+                              Checkpoint* checkpoint) {
   LoopedOdometry odometry(input.camera,
                           options.rotodom,
                           options.loop,
@@ -152,20 +154,21 @@ Orientations FindOrientations(Input& input,
                           flags.NumThreads());
   Orientations orientations;
   LiveCounters counters(options.held_stretches);
+  FrameStream frames(*input.sequence, odometry, checkpoint);
   progress.StartStage("orientations", input.sequence->NumFrames());
-  while (const std::optional<Frame> frame = input.sequence->Next()) {
-    if (frame->image.empty()) {
-      progress.Warn("frame " + std::to_string(frame->id.value) +
-                    " skipped, its pose is interpolated: " + frame->problem);
+  while (const std::optional<FrameStream::Step> step = frames.Next()) {
+    const auto& [frame, estimate] = *step;
+    if (!frame.problem.empty()) {
+      progress.Warn("frame " + std::to_string(frame.id.value) +
+                    " skipped, its pose is interpolated: " + frame.problem);
       ++orientations.num_unreadable;
     }
-    const LoopedEstimate estimate = odometry.AddFrame(frame->id, frame->timestamp_s, frame->image);
-    orientations.timestamps_s.push_back(frame->timestamp_s);
-    orientations.image_names.push_back(frame->name);
+    orientations.timestamps_s.push_back(frame.timestamp_s);
+    orientations.image_names.push_back(frame.name);
     orientations.num_weak += estimate.report.weak;
     orientations.reports.push_back(estimate.report);
     TellDetails(estimate, progress);
-    progress.Step(frame->id.value + 1, counters.Update(estimate, odometry.result()));
+    progress.Step(frame.id.value + 1, counters.Update(estimate, odometry.result()));
     orientations.loops.insert(
         orientations.loops.end(), estimate.loops.begin(), estimate.loops.end());
     orientations.interrupted = interruption.IsRequested();
@@ -197,6 +200,7 @@ Orientations FindOrientations(Input& input,
         " frames could be matched: the images show too few corners in common; check "
         "that they are in focus, exposed and in order");
   }
+  frames.Commit();
   for (const auto& [frame, rotation] : orientations.cam_from_world) {
     orientations.num_predicted += orientations.graph.EdgesOf(frame).empty();
   }

@@ -5,6 +5,7 @@
 #include <string>
 #include <vector>
 
+#include "apps/checkpoint.h"
 #include "apps/given_rotations.h"
 #include "apps/input.h"
 #include "apps/interruption.h"
@@ -47,13 +48,15 @@ struct Orientations : OdometryResult {
 /// @param input       with `given_rotations`, these replace what the images say (see
 ///                    MatchGivenRotations, which says what it throws).
 /// @param vocabulary  null for the one that comes with the program.
+/// @param checkpoint  what it has is not found anew, and what is found it gets; may be null.
 Orientations FindOrientations(Input& input,
                               const PipelineOptions& options,
                               std::shared_ptr<const Vocabulary> vocabulary,
                               bool keep_features,
                               const CommonFlags& flags,
                               const Interruption& interruption,
-                              Progress& progress);
+                              Progress& progress,
+                              Checkpoint* checkpoint = nullptr);
 
 /// Gives the frames without an edge the orientation between those of the nearest frames in time
 /// that have one; again once these have been refined. Given orientations stay.

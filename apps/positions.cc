@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <iterator>
 
+#include "apps/turning.h"
 #include "output/cloud_outliers.h"
 #include "rotodom/types/parallel.h"
 
@@ -239,6 +240,26 @@ PositionResult WithoutMap(PositionResult result, std::string failure) {
   return result;
 }
 
+// The whole sequence as one turn in place, nothing of a map left.
+PositionResult TurningInPlace(const PositionResult& moving,
+                              const TurningResult& turning,
+                              const Orientations& orientations,
+                              const AveragingOptions& options) {
+  PositionResult result;
+  result.cam_from_world =
+      FollowMap(orientations.graph, orientations.cam_from_world, turning.cam_from_world, options);
+  InterpolateUnconnected(orientations, result.cam_from_world);
+  result.camera = turning.camera;
+  result.keyframes = moving.keyframes;
+  result.keyframe_tracks = moving.keyframe_tracks;
+  result.held.push_back(
+      {result.cam_from_world.begin()->first,
+       result.cam_from_world.rbegin()->first,
+       static_cast<double>(turning.num_observations) / NumObservations(result.keyframe_tracks)});
+  result.is_held_throughout = true;
+  return WithoutMap(std::move(result), {});
+}
+
 }  // namespace
 
 PositionResult FindPositions(const Orientations& orientations,
@@ -255,36 +276,56 @@ PositionResult FindPositions(const Orientations& orientations,
       orientations.edge_matches, orientations.features, AllFrames(result.cam_from_world), 2);
   result.held =
       FindHeldStretches(orientations.graph, result.cam_from_world, options.held_stretches);
-  result.keyframes =
-      SelectKeyframes(result.cam_from_world, all_tracks, result.held, options.keyframes);
+  const HeldStretch* everything = StretchAt(result.held, result.cam_from_world.begin()->first);
+  const bool stays =
+      everything != nullptr && everything->last == result.cam_from_world.rbegin()->first;
+  // Of a camera that stays in its place a turn tells the focal length.
+  const bool seeks_focal = stays && options.ba.lens.refine_focal;
+  result.keyframes = SelectKeyframes(result.cam_from_world,
+                                     all_tracks,
+                                     seeks_focal ? std::vector<HeldStretch>() : result.held,
+                                     options.keyframes);
   result.keyframe_tracks = RestrictTracks(all_tracks, result.keyframes, 3);
   const std::vector<Track>& tracks = result.keyframe_tracks;
   progress.EndStage(std::to_string(result.keyframes.size()) + " keyframes, " +
                     std::to_string(tracks.size()) + " tracks, " +
                     std::to_string(result.held.size()) + " pure-rotation stretches");
-  const HeldStretch* everything = StretchAt(result.held, result.cam_from_world.begin()->first);
-  if (everything != nullptr && everything->last == result.cam_from_world.rbegin()->first) {
+  RotationMap keyframe_rotations;
+  for (const FrameId frame : result.keyframes)
+    keyframe_rotations[frame] = result.cam_from_world.at(frame);
+  BundleOptions bundle_options = options.ba;
+  bundle_options.num_threads = num_threads;
+  const auto find_turning = [&]() -> std::optional<PositionResult> {
+    if (!options.held_stretches.enabled) return std::nullopt;
+    progress.StartStage("turning in place", -1);
+    const auto turning =
+        FindTurning(camera, keyframe_rotations, tracks, Redundancy(result.bundles), bundle_options);
+    if (!turning) return std::nullopt;
+    progress.EndStage("explains " + std::to_string(turning->num_observations) + " observations, " +
+                      Describe(turning->camera));
+    return TurningInPlace(result, *turning, orientations, options.rotodom.averaging);
+  };
+  if (stays) {
+    if (seeks_focal) {
+      if (auto turning = find_turning()) return *std::move(turning);
+    }
     result.is_held_throughout = true;
     return WithoutMap(std::move(result), {});
   }
 
   progress.StartStage("known rotation", -1);
-  RotationMap keyframe_rotations;
-  for (const FrameId frame : result.keyframes)
-    keyframe_rotations[frame] = result.cam_from_world.at(frame);
   KrotOptions krot_options = options.krot;
   krot_options.num_threads = num_threads;
   result.krot = SolveKnownRotation(
       keyframe_rotations, tracks, camera, krot_options, OrientationSigmas(orientations));
   progress.EndStage(result.krot.message);
   if (!result.krot.Usable()) {
+    if (auto turning = find_turning()) return *std::move(turning);
     std::string failure = result.krot.message;
     return WithoutMap(std::move(result), std::move(failure));
   }
 
   progress.StartStage("bundle adjustment", -1);
-  BundleOptions bundle_options = options.ba;
-  bundle_options.num_threads = num_threads;
   RefinedComponents refined = RefineComponents(
       keyframe_rotations, result.krot, tracks, result.held, camera, bundle_options);
   result.camera = refined.camera;
@@ -312,11 +353,13 @@ PositionResult FindPositions(const Orientations& orientations,
                                       options.rotodom.averaging);
   }
   if (result.components.empty()) {
+    if (auto turning = find_turning()) return *std::move(turning);
     return WithoutMap(std::move(result), "bundle adjustment found no usable map");
   }
   progress.EndStage(std::to_string(result.map.point_in_world.size()) + " points, mean error " +
                     std::to_string(result.bundles.front().after.mean_px) + " px, " +
                     Describe(result.camera));
+  if (auto turning = find_turning()) return *std::move(turning);
 
   progress.StartStage("frames between keyframes", -1);
   all_tracks = WithBearingsOf(result.camera, std::move(all_tracks));

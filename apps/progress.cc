@@ -66,6 +66,26 @@ std::shared_ptr<spdlog::logger> OpenLog(const std::string& path) {
   }
 }
 
+// Names of files and what stands in them may hold anything: nothing of it steers the terminal.
+// Control characters are the bytes below a blank, 127, and in UTF-8 U+0080 to U+009F. A message
+// that quotes a word of a megabyte is cut.
+std::string Printable(std::string text) {
+  constexpr std::size_t kMaxLength = 2000;
+  if (text.size() > kMaxLength) text = text.substr(0, kMaxLength) + "...";
+  const auto byte = [&](std::size_t k) { return static_cast<unsigned char>(text[k]); };
+  for (std::size_t k = 0; k < text.size(); ++k) {
+    if (text[k] == '\n') {
+      text[k] = ' ';
+    } else if (byte(k) < 0x20 || byte(k) == 0x7f) {
+      text[k] = '?';
+    } else if (byte(k) == 0xc2 && k + 1 < text.size() && byte(k + 1) >= 0x80 &&
+               byte(k + 1) < 0xa0) {
+      text.replace(k, 2, "?");
+    }
+  }
+  return text;
+}
+
 // The first `width` columns; what continues a UTF-8 character takes none.
 std::string_view FirstColumns(std::string_view text, std::size_t width) {
   std::size_t columns = 0;
@@ -122,20 +142,23 @@ Progress::~Progress() {
 
 void Progress::Say(const std::string& line) {
   const std::scoped_lock lock(mutex_);
-  if (log_) log_->info("{}", line);
-  if (!quiet_) Print(line);
+  const std::string text = Printable(line);
+  if (log_) log_->info("{}", text);
+  if (!quiet_) Print(text);
 }
 
 void Progress::Warn(const std::string& line) {
   const std::scoped_lock lock(mutex_);
-  if (log_) log_->warn("{}", line);
-  Print(Coloured("rotslam: warning:", kYellow, colour_) + " " + line);
+  const std::string text = Printable(line);
+  if (log_) log_->warn("{}", text);
+  Print(Coloured("rotslam: warning:", kYellow, colour_) + " " + text);
 }
 
 void Progress::Detail(const std::string& line) {
   const std::scoped_lock lock(mutex_);
-  if (log_) log_->debug("{}", line);
-  if (verbose_) Print(line);
+  const std::string text = Printable(line);
+  if (log_) log_->debug("{}", text);
+  if (verbose_) Print(text);
 }
 
 void Progress::StartStage(const std::string& name, int total) {
@@ -226,7 +249,7 @@ void Progress::Tick() {
 void PrintError(std::string message) {
   // Messages of other libraries may have several lines; ours have one.
   while (!message.empty() && message.back() == '\n') message.pop_back();
-  std::replace(message.begin(), message.end(), '\n', ' ');
+  message = Printable(message);
   if (const auto log = spdlog::get(kLogName)) log->error("{}", message);
   std::fprintf(
       stderr, "%s %s\n", Coloured("rotslam:", kRed, ColoursAreWanted()).c_str(), message.c_str());

@@ -28,7 +28,7 @@ class Progress {
   Progress(const Progress&) = delete;
   Progress& operator=(const Progress&) = delete;
 
-  /// A line that stays.
+  /// A line that stays; control characters, which names of files may hold, are shown as '?'.
   void Say(const std::string& line);
   void Warn(const std::string& line);
   /// A line that only --verbose shows.
@@ -72,7 +72,7 @@ class Progress {
   std::thread ticker_;  // on a terminal only
 };
 
-/// "rotslam: <message>" on standard error as one line, and in the log file if there is one.
+/// "rotslam: <message>" on standard error as one such line, and in the log file if there is one.
 void PrintError(std::string message);
 
 }  // namespace rotslam

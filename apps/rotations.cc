@@ -3,6 +3,7 @@
 #include <string>
 #include <utility>
 
+#include "apps/checkpoint.h"
 #include "apps/command.h"
 #include "apps/focal_guess.h"
 #include "apps/interruption.h"
@@ -11,6 +12,7 @@
 #include "apps/progress.h"
 #include "apps/run_directory.h"
 #include "apps/run_report.h"
+#include "apps/unfinished.h"
 
 namespace rotslam {
 namespace {
@@ -18,6 +20,7 @@ namespace {
 struct RotationsFlags {
   CommonFlags common;
   InputFlags input;
+  CheckpointFlags checkpoint;
   std::string averaging;  // empty: as the configuration says
   bool use_report = true;
 };
@@ -35,19 +38,32 @@ int FindAndWriteRotations(const RotationsFlags& flags) {
   auto vocabulary = OpenVocabulary(flags.input);
   const std::filesystem::path directory = PrepareRunDirectory(flags.input.out);
   RefineGuess(flags.input, flags.common, options, interruption, progress, input);
-  const Orientations orientations = FindOrientations(
-      input, options, std::move(vocabulary), false, flags.common, interruption, progress);
-  WriteOrientations(directory, orientations);
+  Checkpoint checkpoint(directory,
+                        flags.checkpoint,
+                        IdentityOf("rotations", input, flags.input, options, flags.common.seed),
+                        progress);
+  const Orientations orientations = FindOrientations(input,
+                                                     options,
+                                                     std::move(vocabulary),
+                                                     false,
+                                                     flags.common,
+                                                     interruption,
+                                                     progress,
+                                                     &checkpoint);
+  const UnfinishedOutputs outputs(directory);
+  WriteOrientations(outputs.folder(), orientations);
   RunSummary summary = StartSummary("rotations", input, orientations, DescribeOptions(options));
   summary.seconds.push_back(
       {"total", std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count()});
-  WriteSummary(directory / "summary.json", summary);
+  WriteSummary(outputs.folder() / "summary.json", summary);
+  outputs.Publish();
   if (input.guess) progress.Warn(WarningOf(*input.guess, input.camera));
   if (orientations.interrupted) {
-    progress.Warn(DescribeInterrupted(directory, orientations));
+    progress.Warn(DescribeInterrupted(directory, orientations, checkpoint));
     return Interruption::kExitCode;
   }
   if (flags.use_report) WriteReportOfRun(directory, flags.common, progress);
+  checkpoint.Remove();
   progress.Say("wrote " + (directory / "rotations_tum.txt").string() +
                ", rotations.csv, loops.csv, view_graph.g2o, summary.json" +
                (flags.use_report ? ", report.html" : ""));
@@ -62,6 +78,7 @@ void AddRotationsCommand(CLI::App& app, Action& action) {
       "rotations",
       "Every frame's orientation from a sequence, without positions (rotational odometry)");
   AddInputFlags(*command, flags->input);
+  AddCheckpointFlags(*command, flags->checkpoint);
   command
       ->add_option("--averaging",
                    flags->averaging,

@@ -3,6 +3,7 @@
 #include <stdexcept>
 #include <utility>
 
+#include "apps/checkpoint.h"
 #include "apps/command.h"
 #include "apps/focal_guess.h"
 #include "apps/interruption.h"
@@ -12,6 +13,7 @@
 #include "apps/progress.h"
 #include "apps/run_directory.h"
 #include "apps/run_report.h"
+#include "apps/unfinished.h"
 #include "output/ply.h"
 #include "output/trajectory.h"
 
@@ -23,6 +25,7 @@ using Clock = std::chrono::steady_clock;
 struct RunFlags {
   CommonFlags common;
   InputFlags input;
+  CheckpointFlags checkpoint;
   KrotFlags krot;
   bool ascii = false;
   bool use_report = true;
@@ -44,18 +47,30 @@ int Run(const RunFlags& flags) {
   auto vocabulary = OpenVocabulary(flags.input);
   const std::filesystem::path directory = PrepareRunDirectory(flags.input.out);
   RefineGuess(flags.input, flags.common, options, interruption, progress, input);
+  Checkpoint checkpoint(directory,
+                        flags.checkpoint,
+                        IdentityOf("run", input, flags.input, options, flags.common.seed),
+                        progress);
   if (input.guess) FreeFocal(options.ba.lens);
-  const Orientations orientations = FindOrientations(
-      input, options, std::move(vocabulary), true, flags.common, interruption, progress);
-  WriteOrientations(directory, orientations);
+  const Orientations orientations = FindOrientations(input,
+                                                     options,
+                                                     std::move(vocabulary),
+                                                     true,
+                                                     flags.common,
+                                                     interruption,
+                                                     progress,
+                                                     &checkpoint);
+  const UnfinishedOutputs outputs(directory);
+  WriteOrientations(outputs.folder(), orientations);
   const double orientations_s = SecondsSince(start);
   const auto end_early = [&] {
     RunSummary summary = StartSummary("run", input, orientations, DescribeOptions(options));
     summary.interrupted = true;
     summary.seconds.push_back({"orientations", orientations_s});
     summary.seconds.push_back({"total", SecondsSince(start)});
-    WriteSummary(directory / "summary.json", summary);
-    progress.Warn(DescribeInterrupted(directory, orientations));
+    WriteSummary(outputs.folder() / "summary.json", summary);
+    outputs.Publish();
+    progress.Warn(DescribeInterrupted(directory, orientations, checkpoint));
   };
   if (orientations.interrupted) {
     end_early();
@@ -67,21 +82,28 @@ int Run(const RunFlags& flags) {
     return FindPositions(orientations, input.camera, options, flags.common.NumThreads(), progress);
   }();
   const double positions_s = SecondsSince(start) - orientations_s;
-  WritePositions(directory,
+  WritePositions(outputs.folder(),
                  orientations,
                  positions,
                  positions.camera,
                  flags.ascii ? PlyForm::kAscii : PlyForm::kBinary);
-  WriteKnownRotationInput(directory, orientations, positions, input.camera);
-  WriteMaps(directory, *input.sequence, orientations, positions, options.rotodom.features);
+  WriteKnownRotationInput(outputs.folder(), orientations, positions, input.camera);
+  WriteMaps(outputs.folder(), *input.sequence, orientations, positions, options.rotodom.features);
 
   RunSummary summary = StartSummary("run", input, orientations, DescribeOptions(options));
   AddPositions(positions, input.camera, summary);
+  const bool turns_by_lens = positions.is_held_throughout && positions.camera != input.camera;
+  if (turns_by_lens) {
+    summary.calibration = {{"source", "turning"},
+                           {"given_px", input.camera.MeanFocal()},
+                           {"refined_px", positions.camera.MeanFocal()}};
+  }
   if (input.guess) summary.calibration = SummaryOf(*input.guess, positions.camera);
   summary.seconds.push_back({"orientations", orientations_s});
   summary.seconds.push_back({"positions", positions_s});
   summary.seconds.push_back({"total", SecondsSince(start)});
-  WriteSummary(directory / "summary.json", summary);
+  WriteSummary(outputs.folder() / "summary.json", summary);
+  outputs.Publish();
 
   for (std::size_t k = 1; k < positions.components.size(); ++k) {
     progress.Warn("no tracks tie the scale of the map from frame " +
@@ -91,9 +113,13 @@ int Run(const RunFlags& flags) {
   if (input.guess) progress.Warn(WarningOf(*input.guess, positions.camera));
   if (positions.is_held_throughout) {
     progress.Warn(
-        "the camera never leaves its place, so there are no positions and no points to find");
+        "the camera never leaves its place, so there are no positions and no points to find" +
+        (turns_by_lens ? "; only the calibration makes it seem to move, it fits better as " +
+                             Describe(positions.camera)
+                       : std::string()));
   }
   if (flags.use_report) WriteReportOfRun(directory, flags.common, progress);
+  checkpoint.Remove();
   progress.Say("wrote " + directory.string() +
                ": trajectory_tum.txt, trajectory_kitti.txt, keyframes_tum.txt, "
                "rotations_tum.txt, rotations.csv, loops.csv, cloud.ply, cameras.ply, segments.csv, "
@@ -114,6 +140,7 @@ void AddRunCommand(CLI::App& app, Action& action) {
   CLI::App* command = app.add_subcommand(
       "run", "The whole chain: a sequence goes in, a trajectory and a point cloud come out");
   AddInputFlags(*command, flags->input);
+  AddCheckpointFlags(*command, flags->checkpoint);
   AddKrotFlags(*command, flags->krot);
   command->add_option(
       "--rotations",

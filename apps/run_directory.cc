@@ -8,6 +8,7 @@
 #include <system_error>
 
 #include "apps/focal_guess.h"
+#include "apps/unfinished.h"
 #include "output/atomic_file.h"
 #include "output/g2o.h"
 #include "output/known_rotation_file.h"
@@ -141,6 +142,7 @@ std::filesystem::path PrepareRunDirectory(const std::string& out) {
   const std::filesystem::path probe = directory / ".write_test";
   ReplaceFile(probe, "");
   std::filesystem::remove(probe, error);
+  ClearUnfinishedOutputs(directory);
   return directory;
 }
 
@@ -178,17 +180,13 @@ void WritePositions(const std::filesystem::path& directory,
   }
   WriteFrustaPly(directory / "cameras.ply", frusta, camera, form);
   WriteSegments(directory / "segments.csv", segments);
-  const std::filesystem::path covariance_file = directory / "pose_covariance.csv";
-  if (positions.pose_covariance.empty()) {
-    std::filesystem::remove(covariance_file);  // of a run before, into the same folder
-    return;
-  }
+  if (positions.pose_covariance.empty()) return;
   std::vector<PoseCovarianceRow> rows;
   rows.reserve(positions.pose_covariance.size());
   for (const auto& [frame, covariance] : positions.pose_covariance) {
     rows.push_back({frame.value, orientations.timestamps_s[frame.value], covariance});
   }
-  WritePoseCovarianceCsv(covariance_file, rows);
+  WritePoseCovarianceCsv(directory / "pose_covariance.csv", rows);
 }
 
 void WriteKnownRotationInput(const std::filesystem::path& directory,
@@ -238,10 +236,12 @@ void WriteMaps(const std::filesystem::path& directory,
 }
 
 std::string DescribeInterrupted(const std::filesystem::path& directory,
-                                const Orientations& orientations) {
+                                const Orientations& orientations,
+                                const Checkpoint& checkpoint) {
   return "interrupted after " + std::to_string(orientations.timestamps_s.size()) +
          " frames; their orientations are in " + directory.string() +
-         ": rotations_tum.txt, rotations.csv, loops.csv, view_graph.g2o, summary.json";
+         ": rotations_tum.txt, rotations.csv, loops.csv, view_graph.g2o, summary.json" +
+         (checkpoint.IsOn() ? "; --resume goes on from here" : "");
 }
 
 RunSummary StartSummary(const std::string& command,

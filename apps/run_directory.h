@@ -4,6 +4,7 @@
 #include <string>
 #include <vector>
 
+#include "apps/checkpoint.h"
 #include "apps/orientations.h"
 #include "apps/positions.h"
 #include "output/ply.h"
@@ -12,7 +13,8 @@
 namespace rotslam {
 
 /// Makes the folder for a run's results and proves that it can be written, before hours of work.
-/// Throws std::runtime_error with path and reason.
+/// What a killed run was about to publish there is published. Throws std::runtime_error with path
+/// and reason.
 std::filesystem::path PrepareRunDirectory(const std::string& out);
 
 /// rotations_tum.txt, rotations.csv and view_graph.g2o.
@@ -43,7 +45,8 @@ void WriteMaps(const std::filesystem::path& directory,
 
 /// What the terminal says of a run that Ctrl-C has ended: what WriteOrientations has left.
 std::string DescribeInterrupted(const std::filesystem::path& directory,
-                                const Orientations& orientations);
+                                const Orientations& orientations,
+                                const Checkpoint& checkpoint);
 
 /// The parts of summary.json that `run` and `rotations` share.
 RunSummary StartSummary(const std::string& command,

@@ -12,6 +12,7 @@
 
 namespace rotslam {
 
+/// Size and blending of a panorama.
 struct StitchOptions {
   // Width of the whole sphere in pixels; 0: as fine as the images are, at most kMaxWidth.
   int width = 0;

@@ -80,6 +80,7 @@ struct LensOptions {
   }
 };
 
+/// Of bundle adjustment: its rounds, what it may move, and what it leaves out.
 struct BundleOptions {
   // From known-rotation positions, which are a few percent of the path length off, so that a tight
   // test against them would throw away 5 to 10 % of the good observations: none is made. Outliers

@@ -108,7 +108,7 @@ class Minimisation {
     if (refine_lens_) FreeLens(options.lens);
   }
 
-  bool Empty() const { return counts_.num_points == 0 || !moving_; }
+  bool Empty() const { return counts_.num_points + counts_.num_directions == 0 || !moving_; }
   // Counts only; costs and times come from Solve.
   const BundleRoundSummary& Counts() const { return counts_; }
 
@@ -275,8 +275,8 @@ class Minimisation {
     SetCamera(WithLens(calibrated_, lens_), state_);
   }
 
-  // Holds fixed frames, or else the first frame that sees points, and the scale where no two held
-  // centres hold it already.
+  // Holds fixed frames, or else the first one, and the scale where no two held centres hold it
+  // already.
   void FixGauge() {
     std::vector<bool> held(state_.centers.size(), false);
     for (std::size_t k = 0; k < state_.frames.size(); ++k) {
@@ -294,13 +294,29 @@ class Minimisation {
       if (origin < 0) origin = static_cast<int>(c);
       ++num_held;
     }
-    for (std::size_t k = 0; k < state_.frames.size() && origin < 0; ++k) {
-      if (!frame_used_[k] || !center_used_[state_.frames[k].center]) continue;
-      origin = state_.frames[k].center;
-      problem_.SetParameterBlockConstant(cameras_.BlockOfCenter(origin));
-      problem_.SetParameterBlockConstant(cameras_.Quaternion(k));
+    if (origin < 0) origin = HoldFirstFrame();
+    if (origin >= 0 && num_held < 2) AnchorScale(origin);
+  }
+
+  // The first frame that sees points. Where there are directions alone there is no centre to hold:
+  // the first rotation, if the caller holds none.
+  // @return  the frame's centre; -1 without points.
+  int HoldFirstFrame() {
+    const bool has_points = counts_.num_points > 0;
+    const auto used = [&](std::size_t k) {
+      return has_points ? center_used_[state_.frames[k].center] : frame_used_[k];
+    };
+    for (std::size_t k = 0; k < state_.frames.size() && !has_points; ++k) {
+      if (used(k) && state_.frames[k].fixed) return -1;
     }
-    if (num_held < 2) AnchorScale(origin);
+    for (std::size_t k = 0; k < state_.frames.size(); ++k) {
+      if (!frame_used_[k] || !used(k)) continue;
+      problem_.SetParameterBlockConstant(cameras_.Quaternion(k));
+      if (!has_points) return -1;
+      problem_.SetParameterBlockConstant(cameras_.BlockOfCenter(state_.frames[k].center));
+      return state_.frames[k].center;
+    }
+    return -1;
   }
 
   void AnchorScale(int origin) {

@@ -27,6 +27,7 @@ struct ResectionStart {
   std::optional<Eigen::Matrix3d> rotation_covariance;
 };
 
+/// Of placing the frames between the keyframes.
 struct ResectionOptions {
   // What moves. Rotations known better than points can tell them are held; so is the centre of a
   // frame inside a pure rotation.

@@ -7,6 +7,19 @@ target_compile_options(rotslam_warnings INTERFACE
   -Wall -Wextra -Wconversion -Wshadow -Wno-sign-conversion
   $<$<BOOL:${ROTSLAM_WARNINGS_AS_ERRORS}>:-Werror>)
 
+# What makes a memory fault of ours end the program instead of serving whoever found it. Programs are position-independent,
+# like the libraries, and their tables of addresses read-only once they run.
+add_library(rotslam_hardening INTERFACE)
+add_library(rotslam::hardening ALIAS rotslam_hardening)
+if(ROTSLAM_HARDENING)
+  include(CheckPIESupported)
+  check_pie_supported()
+  set(CMAKE_POSITION_INDEPENDENT_CODE ON)
+  target_compile_options(rotslam_hardening INTERFACE
+    "$<$<CONFIG:Release,RelWithDebInfo>:-fstack-protector-strong;-U_FORTIFY_SOURCE;-D_FORTIFY_SOURCE=2>")
+  target_link_options(rotslam_hardening INTERFACE "$<$<CONFIG:Release,RelWithDebInfo>:LINKER:-z,relro,-z,now>")
+endif()
+
 # x86-64-v2 without AVX: Debian's Eigen-based libraries (OpenGV, PCL, Ceres) are built without it, and Eigen's
 # alignment rules change with it.
 set(ROTSLAM_ARCH_FLAGS "")
@@ -27,6 +40,6 @@ function(rotslam_add_library name)
     $<BUILD_INTERFACE:${PROJECT_SOURCE_DIR}>
     $<INSTALL_INTERFACE:${CMAKE_INSTALL_INCLUDEDIR}/rotslam>)
   target_link_libraries(rotslam_${name} PUBLIC ${ARG_PUBLIC}
-    PRIVATE ${ARG_PRIVATE} $<BUILD_INTERFACE:rotslam::warnings>)
+    PRIVATE ${ARG_PRIVATE} $<BUILD_INTERFACE:rotslam::warnings> $<BUILD_INTERFACE:rotslam::hardening>)
   set_property(GLOBAL APPEND PROPERTY ROTSLAM_INSTALLED_TARGETS rotslam_${name})
 endfunction()

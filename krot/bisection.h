@@ -18,6 +18,7 @@ struct BisectionProgress {
   int num_points = 0;  // in the program just solved
 };
 
+/// How closely the bisection brackets the optimum, and by which programs.
 struct BisectionOptions {
   // "interior": our own interior-point programs over the few points that hold the optimum, the LP
   // engine where they stall. "programs": the LP engine alone, over all points; ten to a hundred

@@ -7,6 +7,7 @@
 
 namespace rotslam {
 
+/// When views count as tied to each other.
 struct ComponentOptions {
   // A view joins when it sees at least this many points known to the component. Three determine a
   // position with one to spare; more guard against chance.

@@ -10,6 +10,7 @@
 
 namespace rotslam {
 
+/// When a camera counts as turning in place, or resting, and for how long.
 struct HeldStretchOptions {
   // Holding can be switched off, to see what it is good for.
   bool enabled = true;

@@ -10,6 +10,7 @@
 
 namespace rotslam {
 
+/// All parts of the known-rotation solver. The defaults run a real sequence untouched.
 struct KrotOptions {
   // Which answer gives the positions: "l1", the least sum of misses, forgives outliers and is the
   // better start for bundle adjustment; "bisection", the least largest residual of what l1 kept;

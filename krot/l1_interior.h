@@ -7,6 +7,7 @@
 
 namespace rotslam {
 
+/// When an L1 program counts as solved.
 struct L1InteriorOptions {
   // Ends when the gap between the program's bounds is below this share of the objective, or of what
   // missing one smallest depth costs.

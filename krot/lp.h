@@ -48,6 +48,7 @@ enum class LpEngine { kClp, kGlpk };
 /// Whether this build has the engine.
 bool HasLpEngine(LpEngine engine);
 
+/// Which engine solves a linear program, how, and how long it may take.
 struct LpOptions {
   LpEngine engine = LpEngine::kClp;
   // Interior point: ends with a point inside the optimal face, without clean-up by simplex. Made

@@ -9,6 +9,7 @@
 
 namespace rotslam {
 
+/// When a feasibility program counts as decided.
 struct InteriorOptions {
   // Ends when the gap between the program's bounds is below this share of gamma, or a tenth of the
   // slack.

@@ -24,6 +24,7 @@ PointObservation SightFromCenter(const Eigen::Matrix3d& R_c_w,
                                  const Eigen::Vector3d& point_in_world,
                                  const Eigen::Vector2d& xy);
 
+/// How closely the least largest residual of one point is bracketed.
 struct MinimaxPointOptions {
   // Stop when the bracket is this narrow relative to its upper end. Lower bounds closer than 1e-6
   // drown in rounding.

@@ -15,6 +15,7 @@ struct RayToPoint {
 };
 
 // Not ba's ResectionOptions: both live in namespace rotslam, where a name has one meaning.
+/// Of one camera centre from known points.
 struct CenterResectionOptions {
   double threshold_rad = 0.0057;  // inlier angle; 4 px at f = 700
   int max_samples = 200;

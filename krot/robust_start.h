@@ -9,6 +9,7 @@
 
 namespace rotslam {
 
+/// Of the start that survives outliers.
 struct RobustStartOptions {
   // "interior": our own interior-point programs, the LP engine where they do not converge.
   // "programs": the LP engine alone, two to four times the time of the whole known-rotation stage.

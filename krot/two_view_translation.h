@@ -14,6 +14,7 @@ struct RayPair {
   Eigen::Vector3d ray_b_in_world;
 };
 
+/// Of the direction between two camera centres.
 struct TwoViewTranslationOptions {
   // Angle between a ray and the epipolar plane up to which a pair agrees; 4 px at f = 700. Pairs
   // with less parallax than this have no say in the sign.

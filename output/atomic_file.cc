@@ -8,6 +8,9 @@
 #include <string>
 #include <system_error>
 
+#include <fcntl.h>
+#include <unistd.h>
+
 namespace rotslam {
 namespace {
 
@@ -27,6 +30,14 @@ void WriteWhole(const std::filesystem::path& path,
   const bool closed = std::fclose(file) == 0;
   if (!wrote) Refuse(path, std::generic_category().message(write_error));
   if (!closed) Refuse(path, std::generic_category().message(errno));
+}
+
+void Sync(const std::filesystem::path& path, const std::filesystem::path& temporary) {
+  const int file = open(temporary.c_str(), O_RDONLY | O_CLOEXEC);
+  if (file < 0) Refuse(path, std::generic_category().message(errno));
+  const int error = fsync(file) == 0 ? 0 : errno;
+  close(file);
+  if (error != 0) Refuse(path, std::generic_category().message(error));
 }
 
 // The temporary files there are. Global, because who ends the program knows none of the writers.
@@ -73,8 +84,11 @@ void ReplaceFile(const std::filesystem::path& path,
   temporary += ".tmp";
   const TemporaryFile registered(temporary);
   std::error_code error;
+  // Whatever stands there is not ours: through a link, it would be written to somewhere else.
+  std::filesystem::remove(temporary, error);
   try {
     write(temporary);
+    Sync(path, temporary);
     std::filesystem::rename(temporary, path, error);
     if (error) Refuse(path, error.message());
   } catch (...) {

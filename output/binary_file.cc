@@ -1,24 +1,13 @@
 #include "output/binary_file.h"
 
-#include <fstream>
-#include <iterator>
 #include <stdexcept>
 
+#include "output/text_file.h"
+
 namespace rotslam {
-namespace {
-
-std::string ReadAll(const std::filesystem::path& file) {
-  std::ifstream stream(file, std::ios::binary);
-  if (!stream) {
-    throw std::runtime_error(file.string() + ": no such file, or it cannot be read");
-  }
-  return std::string(std::istreambuf_iterator<char>(stream), {});
-}
-
-}  // namespace
 
 BinaryReader::BinaryReader(const std::filesystem::path& file)
-    : file_(file), bytes_(ReadAll(file)) {}
+    : file_(file), bytes_(ReadBytes(file)) {}
 
 std::string_view BinaryReader::Take(std::uint64_t num_bytes) {
   if (bytes_.size() - at_ < num_bytes) Fail("is cut short");

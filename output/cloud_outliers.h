@@ -7,6 +7,7 @@
 
 namespace rotslam {
 
+/// Which points of a cloud stand alone.
 struct CloudOutlierOptions {
   // Whether points that stand alone leave the cloud.
   bool remove = true;

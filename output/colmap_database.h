@@ -8,6 +8,7 @@
 
 namespace rotslam {
 
+/// Which pairs of images a COLMAP database gets.
 struct ColmapDatabaseOptions {
   // Pairs of images with fewer common tracks are left out: COLMAP does not look at them either
   // (its min_num_matches).

@@ -4,7 +4,6 @@
 #include <array>
 #include <cmath>
 #include <cstdint>
-#include <fstream>
 #include <iterator>
 #include <limits>
 #include <set>
@@ -38,12 +37,6 @@ struct PointTrack {
 
 [[noreturn]] void Fail(const fs::path& file, const std::string& reason) {
   throw std::runtime_error(file.string() + ": " + reason);
-}
-
-std::string ReadAll(const fs::path& file) {
-  std::ifstream stream(file, std::ios::binary);
-  if (!stream) Fail(file, "no such file, or it cannot be read");
-  return std::string(std::istreambuf_iterator<char>(stream), {});
 }
 
 int SmallId(const fs::path& file, const char* what, std::uint64_t id) {
@@ -222,7 +215,7 @@ void ReadBinaryPoints(const fs::path& file, ModelBuilder& builder) {
 // has one.
 std::vector<TextRow> TextLines(const fs::path& file) {
   std::vector<TextRow> rows;
-  std::istringstream stream(ReadAll(file));
+  std::istringstream stream(ReadBytes(file));
   std::string line;
   for (int number = 1; std::getline(stream, line); ++number) {
     if (!line.empty() && line.front() == '#') continue;

@@ -203,8 +203,10 @@ std::pair<Rotation, Camera> ReadBalCamera(RowReader& reader, const auto& number)
   camera.fx = camera.fy = values[6];
   camera.distortion = {values[7], values[8], 0.0, 0.0, 0.0};
   if (const auto problem = camera.Problem()) reader.Fail("camera: " + *problem);
+  const Eigen::Vector3d rotation_vector(values[0], values[1], values[2]);
+  if (!std::isfinite(rotation_vector.norm())) reader.Fail("a rotation vector is out of range");
   const Rotation half_turn = Rotation::Exp({std::numbers::pi, 0.0, 0.0});
-  return {half_turn * Rotation::Exp({values[0], values[1], values[2]}), camera};
+  return {half_turn * Rotation::Exp(rotation_vector), camera};
 }
 
 KnownRotationInput ReadBal(const fs::path& path) {

@@ -37,10 +37,10 @@ std::vector<LoopRow> ReadLoopsCsv(const std::filesystem::path& path) {
   rows.reserve(texts.size());
   for (const TextRow& text : texts) {
     const auto number = [&](std::size_t column) { return NumberAt(path, text, column); };
-    rows.push_back({static_cast<int>(number(0)),
-                    static_cast<int>(number(1)),
+    rows.push_back({IntegerAt(path, text, 0, 0),
+                    IntegerAt(path, text, 1, 0),
                     number(2),
-                    static_cast<int>(number(3)),
+                    IntegerAt(path, text, 3, 0),
                     number(4),
                     number(5) != 0.0,
                     number(6),

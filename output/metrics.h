@@ -8,6 +8,7 @@
 
 namespace rotslam {
 
+/// How two trajectories are paired and compared.
 struct MetricsOptions {
   // Largest gap between two ground-truth poses to interpolate over, seconds. Motion-capture runs
   // at 100 Hz or more, so 0.2 s bridges a short loss of sight and nothing longer.

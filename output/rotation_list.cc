@@ -2,16 +2,12 @@
 
 #include <algorithm>
 #include <array>
-#include <cerrno>
 #include <charconv>
 #include <cmath>
-#include <fstream>
-#include <iterator>
 #include <optional>
 #include <stdexcept>
 #include <string>
 #include <string_view>
-#include <system_error>
 
 #include <Eigen/Cholesky>
 #include <Eigen/LU>
@@ -27,20 +23,6 @@ constexpr double kInformationFactor = 4.0;
 constexpr std::string_view kBlanks = " \t\r,";
 // Matrices and quaternions in files are rounded.
 constexpr double kMaxNormError = 1e-2;
-
-std::string ReadAll(const std::filesystem::path& path) {
-  std::error_code error;
-  if (std::filesystem::is_directory(path, error)) {
-    throw std::runtime_error(path.string() + ": is a folder, not a file");
-  }
-  std::ifstream file(path, std::ios::binary);
-  if (!file) {
-    throw std::runtime_error(path.string() + ": " + std::generic_category().message(errno));
-  }
-  std::string text((std::istreambuf_iterator<char>(file)), std::istreambuf_iterator<char>());
-  if (file.bad()) throw std::runtime_error(path.string() + ": reading stopped half way");
-  return text;
-}
 
 // The words of one line, taken one by one.
 class Line {
@@ -109,6 +91,7 @@ Rotation TakeQuaternion(Line& line) {
 
 Rotation TakeRollPitchYaw(Line& line) {
   const Eigen::Vector3d angles = TakeVector(line);
+  if (!std::isfinite(angles.norm())) line.Fail("an angle is out of range");
   return Rotation::Exp({0.0, 0.0, angles.z()}) * Rotation::Exp({0.0, angles.y(), 0.0}) *
          Rotation::Exp({angles.x(), 0.0, 0.0});
 }
@@ -218,7 +201,7 @@ void TakeLine(Line& line, double sigma_rad, ReadLines& lines) {
 }
 
 ReadLines TakeLines(const std::filesystem::path& path, double sigma_rad) {
-  const std::string text = ReadAll(path);
+  const std::string text = ReadBytes(path);
   ReadLines lines;
   int number = 0;
   for (std::size_t begin = 0; begin < text.size();) {

@@ -38,7 +38,7 @@ std::vector<std::string> CutAtBars(const std::string& words) {
 RotationRow ParseRow(const std::filesystem::path& path, const TextRow& text) {
   const auto number = [&](std::size_t column) { return NumberAt(path, text, column); };
   RotationRow row;
-  row.frame = static_cast<int>(number(0));
+  row.frame = IntegerAt(path, text, 0, 0);
   row.timestamp_s = number(1);
   const Eigen::Quaterniond q(number(5), number(2), number(3), number(4));
   if (!(std::abs(q.norm() - 1.0) < kMaxNormError)) {
@@ -46,7 +46,7 @@ RotationRow ParseRow(const std::filesystem::path& path, const TextRow& text) {
   }
   row.world_from_cam = Rotation(q);
   if (!text.words[6].empty()) row.sigma_deg.emplace(number(6), number(7), number(8));
-  row.inlier_edges = static_cast<int>(number(9));
+  row.inlier_edges = IntegerAt(path, text, 9, 0);
   row.flags = CutAtBars(text.words[10]);
   return row;
 }

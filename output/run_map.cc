@@ -1,6 +1,7 @@
 #include "output/run_map.h"
 
 #include <algorithm>
+#include <limits>
 #include <map>
 #include <set>
 #include <stdexcept>
@@ -34,6 +35,16 @@ Eigen::Vector3d GetPosition(BinaryReader& reader, const char* what) {
   for (double& value : position) value = reader.Get<double>();
   if (!position.allFinite()) reader.Fail(std::string(what) + " is not finite");
   return position;
+}
+
+// An id of a frame or track. Other formats count from 1: the largest one must have a successor.
+int GetId(BinaryReader& reader, const char* what) {
+  const auto id = reader.Get<std::int32_t>();
+  if (id < 0 || id == std::numeric_limits<std::int32_t>::max()) {
+    reader.Fail(std::string(what) + " has the number " + std::to_string(id) +
+                ", not one from 0 on");
+  }
+  return id;
 }
 
 void PutCamera(BinaryWriter& writer, const Camera& camera) {
@@ -88,7 +99,7 @@ MapTrack GetTrack(BinaryReader& reader,
                   const std::set<FrameId>& frames) {
   MapTrack entry;
   Track& track = entry.track;
-  track.id = TrackId{reader.Get<std::int32_t>()};
+  track.id = TrackId{GetId(reader, "a track")};
   const std::string who = "track " + std::to_string(track.id.value);
   for (std::uint8_t& value : track.rgb) value = reader.Get<std::uint8_t>();
   if (reader.Get<std::uint8_t>() != 0) entry.point_in_world = GetPosition(reader, "a point");
@@ -98,7 +109,7 @@ MapTrack GetTrack(BinaryReader& reader,
   entry.levels.reserve(count);
   for (std::uint64_t k = 0; k < count; ++k) {
     Observation observation;
-    observation.frame = FrameId{reader.Get<std::int32_t>()};
+    observation.frame = FrameId{GetId(reader, "a frame")};
     observation.keypoint_px.x() = reader.Get<float>();
     observation.keypoint_px.y() = reader.Get<float>();
     observation.sigma_px = reader.Get<float>();
@@ -265,7 +276,7 @@ RunMap ReadRunMap(const std::filesystem::path& path) {
   map.frames.reserve(num_frames);
   for (auto left = num_frames; left > 0; --left) {
     MapFrame& frame = map.frames.emplace_back();
-    frame.id = FrameId{reader.Get<std::int32_t>()};
+    frame.id = FrameId{GetId(reader, "a frame")};
     if (!frames.empty() && frame.id <= *frames.rbegin()) reader.Fail("its frames do not ascend");
     frames.insert(frame.id);
     frame.timestamp_s = reader.Get<double>();

@@ -23,13 +23,12 @@ std::vector<Segment> ReadSegmentsCsv(const std::filesystem::path& path) {
   std::vector<Segment> segments;
   segments.reserve(texts.size());
   for (const TextRow& text : texts) {
-    const auto number = [&](std::size_t column) { return NumberAt(path, text, column); };
-    segments.push_back({static_cast<int>(number(0)),
-                        static_cast<int>(number(1)),
+    segments.push_back({IntegerAt(path, text, 0, 0),
+                        IntegerAt(path, text, 1, 0),
                         text.words[2],
-                        static_cast<int>(number(3)),
+                        IntegerAt(path, text, 3, -1),
                         text.words[4],
-                        number(5)});
+                        NumberAt(path, text, 5)});
   }
   return segments;
 }

@@ -1,11 +1,13 @@
 #include "output/text_file.h"
 
+#include <algorithm>
 #include <array>
 #include <cerrno>
 #include <charconv>
 #include <cmath>
 #include <cstdio>
 #include <fstream>
+#include <limits>
 #include <stdexcept>
 #include <string_view>
 #include <system_error>
@@ -25,6 +27,18 @@ std::vector<std::string> SplitWords(std::string_view line) {
   return words;
 }
 
+std::ifstream Open(const std::filesystem::path& path) {
+  std::error_code error;
+  if (std::filesystem::is_directory(path, error)) {
+    throw std::runtime_error(path.string() + ": is a folder, not a file");
+  }
+  std::ifstream file(path, std::ios::binary);
+  if (!file) {
+    throw std::runtime_error(path.string() + ": " + std::generic_category().message(errno));
+  }
+  return file;
+}
+
 TextRow CutAtCommas(const std::string& line, int number) {
   TextRow row{number, {""}};
   for (const char c : line) {
@@ -39,14 +53,19 @@ TextRow CutAtCommas(const std::string& line, int number) {
 
 }  // namespace
 
-std::vector<TextRow> ReadTextRows(const std::filesystem::path& path) {
-  std::error_code error;
-  if (std::filesystem::is_directory(path, error)) {
-    throw std::runtime_error(path.string() + ": is a folder, not a file");
+std::string ReadBytes(const std::filesystem::path& path) {
+  std::ifstream file = Open(path);
+  std::string bytes;
+  std::array<char, 65536> buffer;
+  while (file.read(buffer.data(), buffer.size()) || file.gcount() > 0) {
+    bytes.append(buffer.data(), static_cast<std::size_t>(file.gcount()));
   }
-  std::ifstream file(path);
-  if (!file)
-    throw std::runtime_error(path.string() + ": " + std::generic_category().message(errno));
+  if (file.bad()) throw std::runtime_error(path.string() + ": reading stopped half way");
+  return bytes;
+}
+
+std::vector<TextRow> ReadTextRows(const std::filesystem::path& path) {
+  std::ifstream file = Open(path);
   std::vector<TextRow> rows;
   std::string line;
   for (int number = 1; std::getline(file, line); ++number) {
@@ -59,11 +78,7 @@ std::vector<TextRow> ReadTextRows(const std::filesystem::path& path) {
 }
 
 std::vector<TextRow> ReadCsvRows(const std::filesystem::path& path, std::size_t num_columns) {
-  std::error_code error;
-  std::ifstream file(path);
-  if (!file || std::filesystem::is_directory(path, error)) {
-    throw std::runtime_error(path.string() + ": cannot be read");
-  }
+  std::ifstream file = Open(path);
   std::vector<TextRow> rows;
   std::string line;
   std::getline(file, line);  // the columns' names
@@ -80,7 +95,9 @@ std::vector<TextRow> ReadCsvRows(const std::filesystem::path& path, std::size_t 
 }
 
 std::string AtLine(const std::filesystem::path& path, int line, const std::string& reason) {
-  return path.string() + ":" + std::to_string(line) + ": " + reason;
+  std::string text = path.string() + ":" + std::to_string(line) + ": " + reason;
+  std::replace(text.begin(), text.end(), '\n', ' ');  // which a word of a YAML file may hold
+  return text;
 }
 
 double NumberAt(const std::filesystem::path& path, const TextRow& row, std::size_t position) {
@@ -97,6 +114,20 @@ double NumberAt(const std::filesystem::path& path, const TextRow& row, std::size
         AtLine(path, row.line, "expected a finite number, found \"" + word + "\""));
   }
   return value;
+}
+
+int IntegerAt(const std::filesystem::path& path,
+              const TextRow& row,
+              std::size_t position,
+              int low) {
+  const double value = NumberAt(path, row, position);
+  if (value != std::floor(value) || value < low || value > std::numeric_limits<int>::max()) {
+    throw std::runtime_error(AtLine(path,
+                                    row.line,
+                                    "expected a whole number from " + std::to_string(low) +
+                                        " on, found \"" + row.words[position] + "\""));
+  }
+  return static_cast<int>(value);
 }
 
 std::string FormatNumber(const char* format, double value) {

@@ -7,6 +7,9 @@
 
 namespace rotslam {
 
+/// The content of a file. Throws std::runtime_error naming `path` when it cannot be read.
+std::string ReadBytes(const std::filesystem::path& path);
+
 /// One line of a text file that carries data, cut at blanks and commas.
 struct TextRow {
   int line = 0;  // 1 is the file's first line
@@ -27,6 +30,9 @@ std::string AtLine(const std::filesystem::path& path, int line, const std::strin
 /// The row's word at `position` as a finite number; throws std::runtime_error with file and line
 /// when it is something else.
 double NumberAt(const std::filesystem::path& path, const TextRow& row, std::size_t position);
+
+/// The same as a whole number from `low` to the largest int.
+int IntegerAt(const std::filesystem::path& path, const TextRow& row, std::size_t position, int low);
 
 /// `value` with `format`, one printf conversion for a double ("%.12g").
 std::string FormatNumber(const char* format, double value);

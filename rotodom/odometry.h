@@ -5,6 +5,7 @@
 #include <memory>
 #include <optional>
 #include <string>
+#include <string_view>
 #include <utility>
 #include <vector>
 
@@ -16,6 +17,7 @@
 
 namespace rotslam {
 
+/// All stages of rotational odometry. The defaults run a real sequence untouched.
 struct OdometryOptions {
   FeatureOptions features;
   MatchingOptions matching;
@@ -97,6 +99,15 @@ class RotationalOdometry {
   /// @param image  8-bit, one or three channels (BGR), of the camera's size.
   FrameEstimate AddFrame(FrameId frame, double timestamp_s, const cv::Mat& image);
 
+  /// All that later frames depend on, as bytes for RestoreState(). Some megabytes: the grey images
+  /// of the newest views are in it.
+  std::string SaveState();
+
+  /// Goes on, to the last bit, where an odometry stood that was made with the same arguments (but
+  /// for the number of threads) by the same program. Throws std::runtime_error when the bytes are
+  /// cut short; bytes damaged otherwise are for the caller to notice.
+  void RestoreState(std::string_view state);
+
   const OdometrySeconds& seconds() const { return seconds_; }
 
   /// Covariance of a frame that is still in the window, as in FrameEstimate.
@@ -145,6 +156,8 @@ class RotationalOdometry {
                   const std::vector<OrientedView>& views,
                   View& view) const;
   void Remember(std::shared_ptr<View> view);
+  template <class Archive>
+  void Transfer(Archive& archive);
 
   Camera camera_;
   OdometryOptions options_;
@@ -152,7 +165,7 @@ class RotationalOdometry {
   int num_threads_;
 
   std::deque<std::shared_ptr<View>> recent_;     // newest first
-  std::deque<std::shared_ptr<View>> keyframes_;  // newest first
+  std::deque<std::shared_ptr<View>> keyframes_;  // newest first, those not recent without images
   ViewGraph graph_;
   RotationMap cam_from_world_;
   std::map<FrameId, double> timestamps_s_;

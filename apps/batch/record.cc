@@ -2,12 +2,12 @@
 
 #include <cstring>
 #include <fstream>
-#include <iterator>
 #include <stdexcept>
 
 #include <nlohmann/json.hpp>
 
 #include "apps/evaluation.h"
+#include "apps/run_summary.h"
 #include "output/atomic_file.h"
 #include "output/option_list.h"
 #include "output/summary.h"
@@ -37,20 +37,15 @@ Json OptionsOf(const BatchEntry& entry) {
   return options;
 }
 
-// nullopt where there is no such file, or not a whole one.
-std::optional<Json> ReadObject(const fs::path& path) {
-  std::ifstream file(path, std::ios::binary);
-  if (!file) return std::nullopt;
-  Json json = Json::parse(file, nullptr, false);
-  if (!json.is_object()) return std::nullopt;
-  return json;
+// The JSON library would cast a float that no integer can hold.
+std::optional<std::int64_t> Integer(const Json& json) {
+  return json.is_number_integer() ? std::optional(json.get<std::int64_t>()) : std::nullopt;
 }
 
 std::optional<std::int64_t> Count(const Json& summary, const char* name) {
   const Json counts = summary.value("counts", Json::object());
   const auto found = counts.find(name);
-  if (found == counts.end() || !found->is_number()) return std::nullopt;
-  return found->get<std::int64_t>();
+  return found == counts.end() ? std::nullopt : Integer(*found);
 }
 
 fs::path EstimateOf(const BatchEntry& entry, const fs::path& directory) {
@@ -88,21 +83,26 @@ std::string RequestOf(const BatchEntry& entry, std::uint64_t seed) {
                {"vocabulary", entry.vocabulary},
                {"seed", seed},
                {"options", OptionsOf(entry)}})
-      .dump();
+      .dump(-1, ' ', false, Json::error_handler_t::replace);  // paths may be no UTF-8
 }
 
-std::string OptionsFileOf(const BatchEntry& entry) { return OptionsOf(entry).dump(2) + "\n"; }
+std::string OptionsFileOf(const BatchEntry& entry) {
+  return OptionsOf(entry).dump(2, ' ', false, Json::error_handler_t::replace) + "\n";
+}
 
 std::optional<BatchRecord> ReadRecord(const fs::path& directory) {
-  const std::optional<Json> json = ReadObject(directory / kRecordFile);
+  const std::optional<Json> json = ReadJsonObject(directory / kRecordFile);
   if (!json) return std::nullopt;
   try {
     BatchRecord record;
     record.request = json->at("request").dump();
-    record.end.exit_code = json->at("exit_code").get<int>();
+    const auto exit_code = Integer(json->at("exit_code"));
+    const auto max_memory_kb = Integer(json->at("max_memory_kb"));
+    if (!exit_code || !max_memory_kb) return std::nullopt;
+    record.end.exit_code = static_cast<int>(*exit_code);
     record.end.cpu_s = json->at("cpu_s").get<double>();
     record.end.wall_s = json->at("wall_s").get<double>();
-    record.end.max_memory_kb = json->at("max_memory_kb").get<std::int64_t>();
+    record.end.max_memory_kb = *max_memory_kb;
     record.error = json->at("error").get<std::string>();
     return record;
   } catch (const Json::exception&) {
@@ -125,7 +125,7 @@ void WriteRecord(const fs::path& directory, const BatchRecord& record) {
 bool IsFinished(const fs::path& directory, const std::string& request) {
   const std::optional<BatchRecord> record = ReadRecord(directory);
   return record && record->end.exit_code == 0 && record->request == request &&
-         ReadObject(directory / "summary.json").has_value();
+         ReadJsonObject(directory / "summary.json").has_value();
 }
 
 std::string LastErrorLine(const fs::path& log) {
@@ -170,7 +170,7 @@ BatchResult ResultOf(const BatchEntry& entry,
   }
   result.cpu_s = record->end.cpu_s;
   result.note = ReasonOf(*record);
-  const std::optional<Json> summary = ReadObject(directory / "summary.json");
+  const std::optional<Json> summary = ReadJsonObject(directory / "summary.json");
   result.status = record->end.exit_code == 0 && summary ? "done" : "failed";
   if (!summary) {
     if (result.note.empty()) result.note = "summary.json is missing or not whole";

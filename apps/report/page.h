@@ -12,6 +12,7 @@
 
 namespace rotslam {
 
+/// What a report shows, and how large it may become.
 struct ReportOptions {
   PageLimits limits;
   ThumbnailOptions thumbnails;

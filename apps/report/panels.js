@@ -84,6 +84,10 @@ function buildNotes() {
       `and is ${significant(calibration.refined_px, 5)} px now. Angles and shape are as wrong as it is; ` +
       'a calibrated camera does better (rotslam calibrate).');
   }
+  if (calibration.source === 'turning') {
+    warn(`The camera turns in place only if its focal length is ${significant(calibration.refined_px, 5)} px, ` +
+      `not ${significant(calibration.given_px, 5)} px as its calibration says; what is shown rests on that.`);
+  }
   if (counts.unreadable_frames) note(whole(counts.unreadable_frames) + ' frames could not be read.');
   if (counts.frames_without_edge) {
     note(whole(counts.frames_without_edge) +

@@ -1,8 +1,10 @@
 #include "apps/report/thumbnails.h"
 
 #include <algorithm>
+#include <cstdint>
 #include <exception>
 #include <filesystem>
+#include <limits>
 #include <memory>
 #include <optional>
 
@@ -45,7 +47,8 @@ Thumbnails MakeThumbnails(const RunData& run,
     SequenceOptions frames = SequenceOptionsOf(run.summary);
     // Of a folder only the frames that are shown are decoded.
     const int step = (run.NumFrames() + options.max_count - 1) / options.max_count;
-    frames.stride *= step;
+    frames.stride = static_cast<int>(std::min<std::int64_t>(std::int64_t{frames.stride} * step,
+                                                            std::numeric_limits<int>::max()));
     const std::unique_ptr<Sequence> images = OpenSequence(place, frames);
     while (const std::optional<Frame> frame = images->Next()) {
       if (frame->image.empty() || frame->id.value * step >= run.NumFrames()) continue;

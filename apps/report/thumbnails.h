@@ -7,6 +7,7 @@
 
 namespace rotslam {
 
+/// Size and number of the images in a report.
 struct ThumbnailOptions {
   // At most so many frames are shown, evenly spaced; 0 leaves images out.
   int max_count = 160;

@@ -29,6 +29,7 @@ struct CameraPath {
   std::vector<Stretch> stretches;  // empty: the path is not made of stretches
 };
 
+/// Of a walk with a camera in the hand.
 struct HandheldPathOptions {
   int num_frames = 150;
   double fps = 30.0;
@@ -46,6 +47,7 @@ enum class TurnAxis { kYaw, kPitch, kRoll };
 /// `yaw`, `pitch` or `roll`.
 const char* Name(TurnAxis axis);
 
+/// Of a walk, a turn in place and a walk.
 struct GimbalPathOptions {
   int num_frames = 120;
   double fps = 30.0;
@@ -59,6 +61,7 @@ struct GimbalPathOptions {
 /// same three numbers throughout the rotating stretch.
 CameraPath GimbalPath(const GimbalPathOptions& options);
 
+/// Of a drive along a street.
 struct StreetPathOptions {
   double fps = 10.0;
   double speed_scale = 1.0;  // 1: 7 m/s

@@ -25,6 +25,7 @@ enum class SimulationKind {
 /// `gimbal`, `handheld` or `street`.
 const char* Name(SimulationKind kind);
 
+/// Of a simulated sequence: camera, image noise, blur and moving objects.
 struct SimulationOptions {
   SimulationKind kind = SimulationKind::kGimbal;
   // Frames of the whole path; 0: as many as the kind brings (gimbal 120, handheld 150, a street to

@@ -141,6 +141,7 @@ class World {
 /// |x| < 1.5, |z| < 0.9, 1.0 m to 2.3 m above the floor.
 World MakeRoom(std::uint64_t seed);
 
+/// What stands along a simulated street.
 struct StreetOptions {
   double camera_height_m = 1.65;
   double road_half_width_m = 4.6;  // nothing solid stands nearer to the path

@@ -15,6 +15,7 @@ enum class SequenceLayout {
            // mav0/state_groundtruth_estimate0
 };
 
+/// In which form a simulated sequence is written.
 struct WriteOptions {
   SequenceLayout layout = SequenceLayout::kTum;
   int num_threads = 1;  // the bytes written do not depend on it

@@ -19,6 +19,7 @@ enum class AveragingMode {
 /// "off", "window" or "global"; nullopt for another word.
 std::optional<AveragingMode> AveragingModeNamed(const std::string& name);
 
+/// Of averaging over a window or a small view-graph.
 struct AveragingOptions {
   // What is averaged at every frame: off, window or global.
   std::string mode = "window";

@@ -64,6 +64,9 @@ class OrientationCovariance {
                const RotationMap& cam_from_world,
                const std::set<FrameId>& free_views);
 
+  /// False for a forgotten view. AddView asks for the orientations of all others.
+  bool Holds(FrameId view) const { return SlotOf(view) >= 0; }
+
   /// Covariance of the error delta in `Exp(delta) * cam_from_world` of a view, rad^2, in the
   /// camera's frame; nullopt for a forgotten view. Right for the orientation that the view had
   /// after the last AddView.
@@ -72,6 +75,14 @@ class OrientationCovariance {
   /// Covariance of the error delta in `Exp(delta) * j_from_i` of the turn between two views, rad^2,
   /// in the frame of camera j: what the two have in common is left out. Otherwise as Of().
   std::optional<Eigen::Matrix3d> Between(FrameId i, FrameId j) const;
+
+  /// All that later views depend on but for the options, to and from bytes
+  /// (rotodom/types/archive.h).
+  template <class Archive>
+  void Transfer(Archive& archive) {
+    archive(num_added_, view_capacity_, views_, edges_, anchor_covariance_, gains_);
+    archive(system_edges_, lasting_integrals_, normal_root_);
+  }
 
  private:
   struct View {
@@ -82,10 +93,20 @@ class OrientationCovariance {
     int last_edge = 0;        // when it had its last new edge, counted in views
     int position = -1;        // among the free views of the system, -1 when held
     Eigen::Matrix3d R_c_w = Eigen::Matrix3d::Identity();
+
+    template <class Archive>
+    void Transfer(Archive& archive) {
+      archive(id, is_used, number, is_settled, last_edge, position, R_c_w);
+    }
   };
   struct Shared {
     int edge = 0;
     double share = 0.0;  // correlation of the two whitened errors, times two
+
+    template <class Archive>
+    void Transfer(Archive& archive) {
+      archive(edge, share);
+    }
   };
   struct Edge {
     bool is_used = false;
@@ -102,6 +123,12 @@ class OrientationCovariance {
     std::vector<std::uint64_t> keypoints_j;
     std::vector<Shared> shared;                           // itself first
     Eigen::Matrix3d curvature = Eigen::Matrix3d::Zero();  // what it weighs in the system
+
+    template <class Archive>
+    void Transfer(Archive& archive) {
+      archive(is_used, i, j, j_from_i, covariance_in_j, root, begin, end, num_keypoints);
+      archive(keypoints_i, keypoints_j, shared, curvature);
+    }
   };
   // How one view's error follows from those of anchors and edges.
   struct Row {

@@ -24,7 +24,9 @@ namespace {
 namespace fs = std::filesystem;
 
 [[noreturn]] void Fail(const fs::path& file, const std::string& reason) {
-  throw std::runtime_error(file.string() + ": " + reason);
+  std::string text = file.string() + ": " + reason;
+  std::replace(text.begin(), text.end(), '\n', ' ');  // which a word of a YAML file may hold
+  throw std::runtime_error(text);
 }
 
 std::string Lower(std::string text) {

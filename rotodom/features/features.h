@@ -14,6 +14,7 @@
 
 namespace rotslam {
 
+/// How many features a frame gets, how they are spread, and how well they are located.
 struct FeatureOptions {
   // Features asked for per frame. More help weak texture and cost time in matching.
   int max_features = 2000;

@@ -12,6 +12,7 @@
 
 namespace rotslam {
 
+/// When an old place looks enough like the new frame to be compared.
 struct CandidateOptions {
   // A frame is no loop of the ones that came up to this many frames before it.
   int recent_frames = 10;

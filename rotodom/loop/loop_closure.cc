@@ -105,26 +105,55 @@ LoopReport LoopClosure::AddFrame(const FrameEstimate& estimate,
 }
 
 LoopReport LoopClosure::Finish(const RotationMap& cam_from_world, const DisjointSets& pieces) {
-  if (!pending_) return {};
+  std::optional<Place> place = TakePending(cam_from_world);
+  if (!place) return {};
+  LoopReport report = VerifyBest(*place, FindCandidates(*place), cam_from_world, pieces);
+  Remember(*std::move(place), report);
+  return report;
+}
+
+void LoopClosure::Replay(const FrameEstimate& estimate,
+                         std::optional<Features> corners,
+                         const LoopReport& report,
+                         const RotationMap& cam_from_world) {
+  timestamps_s_[estimate.frame] = estimate.timestamp_s;
+  if (std::optional<Place> place = TakePending(cam_from_world)) {
+    FindCandidates(*place);
+    Remember(*std::move(place), report);
+  }
+  if (!corners) return;
+  pending_ = {{*std::move(corners), estimate.features.tracks, {}}, estimate.features.keypoints_px};
+}
+
+std::optional<LoopClosure::Place> LoopClosure::TakePending(const RotationMap& cam_from_world) {
+  if (!pending_) return std::nullopt;
   PendingPlace pending = *std::move(pending_);
   pending_.reset();
-  Place& place = pending.place;
+  if (!TakeOutShutter(cam_from_world, pending.place.corners)) return std::nullopt;
+  pending.place.features = FindNearest(pending.place.corners.keypoints_px, pending.features_px);
+  return std::move(pending.place);
+}
+
+LoopReport LoopClosure::VerifyBest(const Place& place,
+                                   const std::vector<LoopCandidate>& candidates,
+                                   const RotationMap& cam_from_world,
+                                   const DisjointSets& pieces) {
   LoopReport report;
-  if (!TakeOutShutter(cam_from_world, place.corners)) return report;
-  place.features = FindNearest(place.corners.keypoints_px, pending.features_px);
-  const FrameId frame = place.corners.frame;
-  const std::vector<LoopCandidate> candidates = FindCandidates(place);
   const std::size_t count =
       std::min(candidates.size(), static_cast<std::size_t>(options_.max_candidates));
   for (std::size_t k = 0; k < count && report.connections.empty(); ++k) {
     report.checks.push_back(
         Verify(place, candidates[k], cam_from_world, pieces, report.connections));
   }
+  return report;
+}
+
+void LoopClosure::Remember(Place place, const LoopReport& report) {
+  const FrameId frame = place.corners.frame;
   for (const Connection& connection : report.connections) {
     finder_.Join(connection.edge.i, frame);
   }
   places_.emplace(frame, std::move(place));
-  return report;
 }
 
 bool LoopClosure::IsNewPlace(const FrameEstimate& estimate) const {

@@ -17,6 +17,7 @@
 
 namespace rotslam {
 
+/// Of loop closure: the candidates, their verification, and what the loops do to the averaging.
 struct LoopOptions {
   // Look for places seen before; what is remembered then grows with the sequence.
   bool use_loops = true;
@@ -110,6 +111,17 @@ class LoopClosure {
   /// After the last frame: what became of that.
   LoopReport Finish(const RotationMap& cam_from_world, const DisjointSets& pieces);
 
+  /// Described corners of the newest frame, if that is to be a place; else null.
+  const Features* NewestCorners() const { return pending_ ? &pending_->place.corners : nullptr; }
+
+  /// Takes a frame again from what AddFrame said, without the image and without looking for loops.
+  /// @param corners  what NewestCorners() was then.
+  /// @param report   of the frame before.
+  void Replay(const FrameEstimate& estimate,
+              std::optional<Features> corners,
+              const LoopReport& report,
+              const RotationMap& cam_from_world);
+
   int num_places() const { return static_cast<int>(places_.size()); }
   const LoopSeconds& seconds() const { return seconds_; }
 
@@ -130,10 +142,19 @@ class LoopClosure {
 
   bool IsNewPlace(const FrameEstimate& estimate) const;
   PendingPlace Describe(const FrameEstimate& estimate, const cv::Mat& image);
+  // The pending place, now that the rotation after it is known; nullopt where there is none or its
+  // corners are not known well enough.
+  std::optional<Place> TakePending(const RotationMap& cam_from_world);
+  LoopReport VerifyBest(const Place& place,
+                        const std::vector<LoopCandidate>& candidates,
+                        const RotationMap& cam_from_world,
+                        const DisjointSets& pieces);
+  void Remember(Place place, const LoopReport& report);
   // Moves the corners to where a global shutter would have seen them; false when that is not known
   // well enough.
   bool TakeOutShutter(const RotationMap& cam_from_world, Features& corners) const;
   std::vector<FrameId> NeighboursOf(const Place& place) const;
+  // From now on it is one itself.
   std::vector<LoopCandidate> FindCandidates(const Place& place);
   LoopCheck Verify(const Place& place,
                    const LoopCandidate& candidate,

@@ -4,8 +4,21 @@
 #include <utility>
 
 #include "rotodom/loop/default_vocabulary.h"
+#include "rotodom/loop/frame_record.h"
 
 namespace rotslam {
+namespace {
+
+// The search for loops asks for the features of places only.
+void DropWhatTracksNeed(FrameRecord& record) {
+  if (!record.corners) record.estimate.features = {};
+  record.estimate.revised_features.reset();
+  for (auto* connections : {&record.estimate.connections, &record.loops.connections}) {
+    for (Connection& connection : *connections) connection.matches.pairs.clear();
+  }
+}
+
+}  // namespace
 
 LoopedOdometry::LoopedOdometry(const Camera& camera,
                                const OdometryOptions& odometry,
@@ -16,6 +29,7 @@ LoopedOdometry::LoopedOdometry(const Camera& camera,
                                int num_threads)
     : odometry_(camera, odometry, seed, num_threads),
       window_(odometry.averaging.window),
+      keep_features_(keep_features),
       orientations_(odometry.averaging, loops, keep_features, num_threads) {
   // Chained orientations are what the odometry gives when nothing is averaged.
   if (!loops.use_loops || odometry.averaging.mode == "off") return;
@@ -23,22 +37,44 @@ LoopedOdometry::LoopedOdometry(const Camera& camera,
   closure_.emplace(camera, loops, odometry, std::move(vocabulary), seed, num_threads);
 }
 
-LoopedEstimate LoopedOdometry::AddFrame(FrameId frame, double timestamp_s, const cv::Mat& image) {
+LoopedEstimate LoopedOdometry::AddFrame(FrameId frame,
+                                        double timestamp_s,
+                                        const cv::Mat& image,
+                                        FrameRecord* record) {
   FrameEstimate estimate = odometry_.AddFrame(frame, timestamp_s, image);
-  LoopedEstimate looped;
-  looped.frame = frame;
-  looped.covariance = estimate.covariance;
-  looped.report = estimate.report;
+  if (record != nullptr) *record = {estimate, std::nullopt, {}};
   orientations_.BeginFrame(estimate);
   LoopReport loops;
   if (closure_) {
     loops = closure_->AddFrame(estimate, image, result().cam_from_world, orientations_.pieces());
+    if (record != nullptr) {
+      record->loops = loops;
+      if (const Features* corners = closure_->NewestCorners()) record->corners = *corners;
+    }
   }
+  if (record != nullptr && !keep_features_) DropWhatTracksNeed(*record);
+  return Take(std::move(estimate), std::move(loops));
+}
+
+LoopedEstimate LoopedOdometry::Replay(FrameRecord record) {
+  orientations_.BeginFrame(record.estimate);
+  if (closure_) {
+    closure_->Replay(
+        record.estimate, std::move(record.corners), record.loops, result().cam_from_world);
+  }
+  return Take(std::move(record.estimate), std::move(record.loops));
+}
+
+LoopedEstimate LoopedOdometry::Take(FrameEstimate estimate, LoopReport loops) {
+  LoopedEstimate looped;
+  looped.frame = estimate.frame;
+  looped.covariance = estimate.covariance;
+  looped.report = estimate.report;
   orientations_.AddFrame(std::move(estimate));
   orientations_.AddLoop(std::move(loops.connections));
   looped.loops = std::move(loops.checks);
   looped.has_averaged = orientations_.EndFrame();
-  looped.cam_from_world = result().cam_from_world.at(frame);
+  looped.cam_from_world = result().cam_from_world.at(looped.frame);
   return looped;
 }
 

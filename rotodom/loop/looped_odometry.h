@@ -3,6 +3,8 @@
 #include <cstdint>
 #include <memory>
 #include <optional>
+#include <string>
+#include <string_view>
 #include <utility>
 #include <vector>
 
@@ -25,6 +27,8 @@ struct LoopedEstimate {
   bool has_averaged = false;     // orientations of older frames have moved as a loop says
 };
 
+struct FrameRecord;
+
 /// Rotational odometry that notices when the camera is back, and then spreads the drift over all
 /// orientations (LoopedOrientations). The odometry itself goes on undisturbed; its orientations are
 /// turned into the world that the last averaging left. What is remembered grows with the sequence.
@@ -42,7 +46,19 @@ class LoopedOdometry {
                  int num_threads);
 
   /// Takes the next frame, as RotationalOdometry::AddFrame.
-  LoopedEstimate AddFrame(FrameId frame, double timestamp_s, const cv::Mat& image);
+  /// @param record  when given, receives what Replay needs.
+  LoopedEstimate AddFrame(FrameId frame,
+                          double timestamp_s,
+                          const cv::Mat& image,
+                          FrameRecord* record = nullptr);
+
+  /// To go on where another one stood that was made with the same arguments (but for the number of
+  /// threads) by the same program: takes all its frames, by their records, and then the state of
+  /// its odometry after the last of them, as RotationalOdometry::SaveState() and RestoreState().
+  /// What follows is the same to the last bit.
+  LoopedEstimate Replay(FrameRecord record);
+  std::string SaveState() { return odometry_.SaveState(); }
+  void RestoreState(std::string_view state) { odometry_.RestoreState(state); }
 
   /// To be called after the last frame: averages once more when there were loops, and completes
   /// the covariances. What the last frame looked like.
@@ -58,8 +74,11 @@ class LoopedOdometry {
   int num_places() const { return closure_ ? closure_->num_places() : 0; }
 
  private:
+  LoopedEstimate Take(FrameEstimate estimate, LoopReport loops);
+
   RotationalOdometry odometry_;
   int window_;
+  bool keep_features_;
   std::optional<LoopClosure> closure_;
   LoopedOrientations orientations_;
 };

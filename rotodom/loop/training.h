@@ -11,6 +11,7 @@
 
 namespace rotslam {
 
+/// Shape of a vocabulary to train, and how long to train it.
 struct TrainingOptions {
   // Children of a node, 2 to 255, and levels below the root: branching^depth words at most, fewer
   // where the descriptors run out. 10 and 5 give up to 100,000 words, which take 4 MB; with 10,000

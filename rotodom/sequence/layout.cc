@@ -135,6 +135,27 @@ std::vector<fs::path> ImagesIn(const fs::path& folder) {
   return files;
 }
 
+// The times of a list, the first word of each line: seconds, or where all of them say so as
+// file names do, ms, us or ns since 1970.
+std::vector<double> TimesOf(const fs::path& list,
+                            const std::vector<TextLine>& lines,
+                            const std::string& wanted) {
+  std::vector<std::string> words;
+  words.reserve(lines.size());
+  for (const TextLine& line : lines) {
+    words.push_back(line.text.substr(0, line.text.find_first_of(" \t")));
+  }
+  if (auto times_s = TimestampsFromNames(words); times_s && !words.empty()) return *times_s;
+  std::vector<double> times_s;
+  times_s.reserve(lines.size());
+  for (std::size_t k = 0; k < lines.size(); ++k) {
+    const auto time_s = ParseSeconds(words[k]);
+    if (!time_s) FailAtLine(list, lines[k], wanted);
+    times_s.push_back(*time_s);
+  }
+  return times_s;
+}
+
 std::optional<fs::path> FirstFile(std::initializer_list<fs::path> candidates) {
   for (const fs::path& candidate : candidates) {
     if (IsFile(candidate)) return candidate;
@@ -183,12 +204,11 @@ Layout ListKitti(const fs::path& image_folder) {
   if (!IsFile(list)) {
     Fail(list, "is missing; give " + image_folder.string() + " to take the images without it");
   }
-  std::vector<double> times_s;
-  for (const TextLine& line : ReadLines(list)) {
-    const auto time = ParseSeconds(line.text);
-    if (!time) FailAtLine(list, line, "seconds");
-    times_s.push_back(*time);
+  const std::vector<TextLine> lines = ReadLines(list);
+  for (const TextLine& line : lines) {
+    if (line.text.find_first_of(" \t") != std::string::npos) FailAtLine(list, line, "seconds");
   }
+  const std::vector<double> times_s = TimesOf(list, lines, "seconds");
   const std::vector<fs::path> files = ImagesIn(image_folder);
   if (files.empty()) Fail(image_folder, "holds no images");
   for (std::size_t k = 0; k < files.size(); ++k) {
@@ -215,12 +235,13 @@ Layout ListTum(const fs::path& root) {
   layout.kind = SequenceKind::kTumRgbd;
   layout.folder = root;
   const fs::path list = root / "rgb.txt";
-  for (const TextLine& line : ReadLines(list)) {
-    const std::string_view text = line.text;
+  const std::vector<TextLine> lines = ReadLines(list);
+  const std::vector<double> times_s = TimesOf(list, lines, "'seconds file name'");
+  for (std::size_t k = 0; k < lines.size(); ++k) {
+    const std::string_view text = lines[k].text;
     const std::size_t blank = text.find_first_of(" \t");
-    const auto time = ParseSeconds(text.substr(0, blank));
-    if (!time || blank == std::string_view::npos) FailAtLine(list, line, "'seconds file name'");
-    layout.entries.push_back({root / std::string(Trimmed(text.substr(blank))), *time});
+    if (blank == std::string_view::npos) FailAtLine(list, lines[k], "'seconds file name'");
+    layout.entries.push_back({root / std::string(Trimmed(text.substr(blank))), times_s[k]});
   }
   if (layout.entries.empty()) Fail(list, "lists no images");
   layout.camera_file = FirstFile({root / "camera.yaml"});

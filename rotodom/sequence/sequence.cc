@@ -1,24 +1,19 @@
 #include "rotodom/sequence/sequence.h"
 
 #include <algorithm>
-#include <array>
 #include <cmath>
 #include <cstdint>
-#include <fstream>
-#include <functional>
 #include <future>
 #include <iomanip>
-#include <iterator>
 #include <sstream>
 #include <stdexcept>
 #include <utility>
 
 #include <opencv2/core.hpp>
-#include <opencv2/imgcodecs.hpp>
-#include <opencv2/imgproc.hpp>
 #include <opencv2/videoio.hpp>
 #include <opencv2/videoio/registry.hpp>
 
+#include "rotodom/sequence/image_file.h"
 #include "rotodom/sequence/layout.h"
 
 namespace rotslam {
@@ -28,106 +23,6 @@ namespace fs = std::filesystem;
 
 std::string SizeText(const cv::Size& size) {
   return std::to_string(size.width) + "x" + std::to_string(size.height);
-}
-
-// 8 bits, 1 or 3 channels; empty, with `problem` set, when the pixels are of another kind.
-cv::Mat ToEightBits(cv::Mat image, std::string& problem) {
-  if (image.channels() == 4) cv::cvtColor(image, image, cv::COLOR_BGRA2BGR);
-  if (image.depth() == CV_16U) {
-    cv::Mat scaled;
-    image.convertTo(scaled, CV_8U, 255.0 / 65535.0);
-    image = scaled;
-  }
-  if (image.depth() == CV_8U && (image.channels() == 1 || image.channels() == 3)) return image;
-  problem = "pixels are neither 8 nor 16 bits, or not of 1, 3 or 4 channels";
-  return {};
-}
-
-// A JPEG file that ends before its end marker decodes to grey below the break. The marker must come
-// behind the start of the last scan: a thumbnail in the header has markers of its own.
-bool IsCutOffJpeg(const std::vector<unsigned char>& bytes) {
-  if (bytes.size() < 4 || bytes[0] != 0xff || bytes[1] != 0xd8) return false;
-  constexpr unsigned char kScan[] = {0xff, 0xda};
-  constexpr unsigned char kEnd[] = {0xff, 0xd9};
-  const auto scan = std::find_end(bytes.begin(), bytes.end(), std::begin(kScan), std::end(kScan));
-  return std::search(scan, bytes.end(), std::begin(kEnd), std::end(kEnd)) == bytes.end();
-}
-
-// CRC-32 of PNG, gzip and Ethernet, bit by bit through a table.
-std::uint32_t Crc32(const unsigned char* begin, const unsigned char* end) {
-  static const std::array<std::uint32_t, 256> table = [] {
-    std::array<std::uint32_t, 256> entries;
-    for (std::uint32_t byte = 0; byte < 256; ++byte) {
-      std::uint32_t value = byte;
-      for (int bit = 0; bit < 8; ++bit) value = (value >> 1) ^ ((value & 1) != 0 ? 0xedb88320 : 0);
-      entries[byte] = value;
-    }
-    return entries;
-  }();
-  std::uint32_t crc = 0xffffffff;
-  for (; begin != end; ++begin) crc = (crc >> 8) ^ table[(crc ^ *begin) & 0xff];
-  return ~crc;
-}
-
-// What is wrong with the chunks of a PNG file; empty when nothing is, or when it is no PNG file.
-// The decoder takes damaged pixels for good ones, and complains on stderr by itself.
-std::string DamageOfPng(const std::vector<unsigned char>& bytes) {
-  constexpr unsigned char kSignature[] = {0x89, 'P', 'N', 'G', '\r', '\n', 0x1a, '\n'};
-  constexpr unsigned char kEnd[] = {'I', 'E', 'N', 'D'};
-  if (bytes.size() < 8 || !std::equal(kSignature, kSignature + 8, bytes.begin())) return {};
-  const auto number_at = [&](std::size_t at) {
-    return std::uint32_t{bytes[at]} << 24 | std::uint32_t{bytes[at + 1]} << 16 |
-           std::uint32_t{bytes[at + 2]} << 8 | std::uint32_t{bytes[at + 3]};
-  };
-  // A chunk is its length, type, that many bytes, and the CRC of type and bytes.
-  for (std::size_t at = 8; at + 12 <= bytes.size();) {
-    const std::size_t length = number_at(at);
-    if (length > bytes.size() - at - 12) break;
-    const unsigned char* type = bytes.data() + at + 4;
-    const bool is_critical = (type[0] & 0x20) == 0;
-    if (is_critical && Crc32(type, type + 4 + length) != number_at(at + 8 + length)) {
-      return "PNG data are damaged (checksum)";
-    }
-    if (std::equal(kEnd, kEnd + 4, type)) return {};
-    at += 12 + length;
-  }
-  return "PNG data are cut off";
-}
-
-cv::Mat DecodeImage(const fs::path& file, std::string& problem) {
-  std::ifstream stream(file, std::ios::binary | std::ios::ate);
-  std::vector<unsigned char> bytes;
-  if (const std::streamoff size = stream.tellg(); size > 0) {
-    bytes.resize(static_cast<std::size_t>(size));
-    stream.seekg(0);
-    stream.read(reinterpret_cast<char*>(bytes.data()), size);
-  }
-  if (!stream.is_open() || stream.bad()) {
-    problem = "file cannot be opened";
-    return {};
-  }
-  if (bytes.empty()) {
-    problem = "file is empty";
-    return {};
-  }
-  if (IsCutOffJpeg(bytes)) {
-    problem = "JPEG data are cut off";
-    return {};
-  }
-  problem = DamageOfPng(bytes);
-  if (!problem.empty()) return {};
-  cv::Mat image;
-  try {
-    image = cv::imdecode(bytes,
-                         cv::IMREAD_ANYCOLOR | cv::IMREAD_ANYDEPTH | cv::IMREAD_IGNORE_ORIENTATION);
-  } catch (const cv::Exception&) {
-    // Such as a header that claims a size beyond OpenCV's limit.
-  }
-  if (image.empty()) {
-    problem = "image cannot be decoded";
-    return {};
-  }
-  return ToEightBits(std::move(image), problem);
 }
 
 [[noreturn]] void FailBeyondEnd(const fs::path& place, int first, int num_frames) {
@@ -167,28 +62,28 @@ class FileSequence : public Sequence {
     FindImageSize();
   }
 
- private:
-  struct Decoded {
-    cv::Mat image;
-    std::string problem;
-  };
-
-  static Decoded DecodeEntry(const ImageEntry& entry) {
-    Decoded decoded;
-    decoded.image = DecodeImage(entry.file, decoded.problem);
-    return decoded;
+  void Skip(int count) override {
+    ahead_ = {};
+    next_ += std::min(count, num_frames_ - next_);
   }
 
+  std::vector<fs::path> Files() const override {
+    std::vector<fs::path> files;
+    files.reserve(entries_.size());
+    for (const ImageEntry& entry : entries_) files.push_back(entry.file);
+    return files;
+  }
+
+ private:
   void FindImageSize() {
     std::string first_problem;
     for (const ImageEntry& entry : entries_) {
-      std::string problem;
-      const cv::Mat image = DecodeImage(entry.file, problem);
-      if (!image.empty()) {
-        image_size_ = image.size();
+      const DecodedImage decoded = ReadImageFile(entry.file);
+      if (!decoded.image.empty()) {
+        image_size_ = decoded.image.size();
         return;
       }
-      if (first_problem.empty()) first_problem = problem;
+      if (first_problem.empty()) first_problem = decoded.problem;
     }
     throw std::runtime_error(place_.string() + ": none of the " + std::to_string(num_frames_) +
                              " images can be read; " + entries_.front().file.filename().string() +
@@ -202,9 +97,9 @@ class FileSequence : public Sequence {
     frame.id = FrameId{next_++};
     frame.timestamp_s = entry.timestamp_s;
     frame.name = entry.file.filename().string();
-    Decoded decoded = ahead_.valid() ? ahead_.get() : DecodeEntry(entry);
+    DecodedImage decoded = ahead_.valid() ? ahead_.get() : ReadImageFile(entry.file);
     if (next_ < num_frames_) {
-      ahead_ = std::async(std::launch::async, DecodeEntry, std::cref(entries_[next_]));
+      ahead_ = std::async(std::launch::async, ReadImageFile, entries_[next_].file);
     }
     frame.image = std::move(decoded.image);
     frame.problem = std::move(decoded.problem);
@@ -213,7 +108,8 @@ class FileSequence : public Sequence {
 
   std::vector<ImageEntry> entries_;
   int next_ = 0;
-  std::future<Decoded> ahead_;  // image next_, decoded while the caller works on the one before
+  // Image next_, decoded while the caller works on the one before.
+  std::future<DecodedImage> ahead_;
 };
 
 // FFmpeg where OpenCV has it: with any other back end allowed, a file that is no video makes each
@@ -240,6 +136,12 @@ class VideoSequence : public Sequence {
       num_frames_ = std::max(0, last - options.first) / options.stride + 1;
     }
   }
+
+  void Skip(int count) override {
+    for (int k = 0; k < count && Advance(); ++k) timestamps_s_.push_back(time_s_);
+  }
+
+  std::vector<fs::path> Files() const override { return {place_}; }
 
  private:
   // Reads the first frames once: is there a picture, and do their timestamps increase?
@@ -299,7 +201,9 @@ class VideoSequence : public Sequence {
     cv::Mat image;
     if (capture_.retrieve(image) && !image.empty()) {
       // The capture reuses its buffer.
-      frame.image = ToEightBits(image.clone(), frame.problem);
+      DecodedImage decoded = ToEightBits(image.clone());
+      frame.image = std::move(decoded.image);
+      frame.problem = std::move(decoded.problem);
     } else {
       frame.problem = "frame of the video cannot be decoded";
     }

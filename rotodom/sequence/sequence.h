@@ -66,6 +66,12 @@ class Sequence {
   /// image_size(), comes as an empty one with `problem` set: it never throws.
   std::optional<Frame> Next();
 
+  /// Passes over the next `count` frames, or those that are left, without decoding images.
+  virtual void Skip(int count) = 0;
+
+  /// The images that Next() gives, in its order; of a video the file.
+  virtual std::vector<std::filesystem::path> Files() const = 0;
+
   /// Frames that Next() gives in all. For a video it is what the file claims until the last frame
   /// has been read, and -1 where the file claims nothing.
   int NumFrames() const { return num_frames_; }
@@ -115,9 +121,9 @@ class Sequence {
 ///   KITTI odometry `image_0/` (else `image_2/`) and `times.txt`; or the path is such an `image_*`
 ///   TUM RGB-D      `rgb.txt`
 ///   image folder   images in the folder itself, else in its `images/`
-/// Timestamps come from the data set; in an image folder from the file names where each is a number
-/// with a decimal point (seconds) or the ms, us or ns since 1970 of a date in this century, else
-/// from `fps`, and images are ordered by time or, digits counting as numbers, by name. A video
+/// Timestamps come from the data set's list, or the names in an image folder, where each is seconds
+/// (EuRoC: ns; in names with a point) or the ms, us or ns since 1970 of a date in this century,
+/// else from `fps`, and images are ordered by time or, digits counting as numbers, by name. A video
 /// keeps its own timestamps where its first frames have increasing ones.
 ///
 /// Images are taken as stored, whatever orientation their EXIF data ask for (a phone changes its

@@ -1,6 +1,8 @@
 #include "rotodom/tracking/recovery.h"
 
 #include <algorithm>
+#include <utility>
+#include <vector>
 
 #include "rotodom/tracking/patch_alignment.h"
 
@@ -23,13 +25,21 @@ PatchAlignment SharpenedPosition(const View& view,
   return found && found->correlation >= min_correlation ? *found : corner;
 }
 
+// What one view says, and whether enough of what looks alike agrees on it.
+struct Witness {
+  Recovery recovery;
+  bool is_clear = false;
+
+  int num_points() const { return static_cast<int>(recovery.points.size()); }
+};
+
 // Matches one view's points against the target's corners, which have been described.
-std::optional<Recovery> RecoverFrom(std::span<const OrientedView> views,
-                                    int v,
-                                    const Features& corners,
-                                    const TrackingTarget& target,
-                                    const Camera& camera,
-                                    const RecoveryOptions& options) {
+std::optional<Witness> RecoverFrom(std::span<const OrientedView> views,
+                                   int v,
+                                   const Features& corners,
+                                   const TrackingTarget& target,
+                                   const Camera& camera,
+                                   const RecoveryOptions& options) {
   const View& view = *views[v].view;
   Features described = view.features;
   DescribeFeatures(view.pyramid, options.num_threads, described);
@@ -75,7 +85,31 @@ std::optional<Recovery> RecoverFrom(std::span<const OrientedView> views,
   std::sort(recovery.points.begin(), recovery.points.end(), [](const auto& a, const auto& b) {
     return a.track < b.track;
   });
-  return recovery;
+  const double least = options.min_inlier_ratio * static_cast<double>(pairs.size());
+  return Witness{std::move(recovery), static_cast<double>(estimate->inliers.size()) > least};
+}
+
+// The clear one with the most points that another clear one confirms; alone, it is believed: stills
+// far apart overlap only with the one before.
+std::optional<Recovery> MostPointsConfirmed(std::vector<Witness>& witnesses) {
+  // Views a few frames apart see much the same; where they differ by more, so may the truth.
+  constexpr double kSameRotationDeg = 1.0;
+  std::erase_if(witnesses, [](const Witness& witness) { return !witness.is_clear; });
+  const auto is_confirmed = [&](const Witness& witness) {
+    return witnesses.size() == 1 ||
+           std::any_of(witnesses.begin(), witnesses.end(), [&](const Witness& other) {
+             const Rotation doubt =
+                 other.recovery.cam_from_world * witness.recovery.cam_from_world.Inverse();
+             return &other != &witness && doubt.AngleDeg() <= kSameRotationDeg;
+           });
+  };
+  Witness* best = nullptr;
+  for (Witness& witness : witnesses) {
+    if (best != nullptr && witness.num_points() <= best->num_points()) continue;
+    if (is_confirmed(witness)) best = &witness;
+  }
+  if (best == nullptr) return std::nullopt;
+  return std::move(best->recovery);
 }
 
 }  // namespace
@@ -87,17 +121,15 @@ std::optional<Recovery> RecoverMotion(std::span<const OrientedView> views,
   Features corners;
   DetectFeatures(*target.pyramid, camera, options.features, options.num_threads, corners);
   DescribeFeatures(*target.pyramid, options.num_threads, corners);
-  const auto num_points = [](const std::optional<Recovery>& recovery) {
-    return recovery ? static_cast<int>(recovery->points.size()) : -1;
-  };
-  std::optional<Recovery> best;
+  std::vector<Witness> witnesses;
   for (int v = 0; v < static_cast<int>(views.size()); ++v) {
-    std::optional<Recovery> recovery = RecoverFrom(views, v, corners, target, camera, options);
-    if (num_points(recovery) > num_points(best)) best = std::move(recovery);
-    // Few points may agree by chance: then an older view is asked as well.
-    if (num_points(best) >= options.tracking.min_points) break;
+    std::optional<Witness> witness = RecoverFrom(views, v, corners, target, camera, options);
+    if (!witness) continue;
+    if (witness->num_points() >= options.tracking.min_points) return std::move(witness->recovery);
+    // Few points may agree by chance: then the older views are asked as well.
+    witnesses.push_back(*std::move(witness));
   }
-  return best;
+  return MostPointsConfirmed(witnesses);
 }
 
 }  // namespace rotslam

@@ -11,6 +11,7 @@
 
 namespace rotslam {
 
+/// When a frame becomes a keyframe.
 struct KeyframeOptions {
   // A frame becomes a keyframe when the median angle between its rays and the last keyframe's,
   // rotation taken out, has grown to this: less gives more keyframes than triangulation gains from.

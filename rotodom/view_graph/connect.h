@@ -14,6 +14,7 @@
 
 namespace rotslam {
 
+/// Which earlier views a new one is tied to, and by what edges.
 struct ViewGraphOptions {
   // A new frame is matched against this many frames before it; the paper's |F|.
   int window_frames = 4;
@@ -53,6 +54,7 @@ struct Connection {
   std::vector<int> outliers_j;  // keypoints of frame j whose match does not
 };
 
+/// Of edges between pairs of views.
 struct ConnectOptions {
   RelativeRotationOptions relative_rotation;
   std::uint64_t seed = 1;

@@ -101,6 +101,19 @@ TEST_F(BadInput, ListsWithFaults) {
   EXPECT_THAT(Refusal(Run(sequence)), HasSubstr("is not later than"));
   folder_.Write("copy/rgb.txt", "# timestamp filename\n");
   EXPECT_THAT(Refusal(Run(sequence)), HasSubstr("lists no images"));
+  const std::string first = Images(sequence)[0].filename().string();
+  folder_.Write("copy/rgb.txt", list + "999.0 rgb/" + first + "\n");
+  EXPECT_THAT(Refusal(Run(sequence)), HasSubstr("is not later than"));
+  folder_.Write("copy/rgb.txt", list + "nan rgb/" + first + "\n");
+  EXPECT_THAT(Refusal(Run(sequence)), HasSubstr("line 28 is 'nan"));
+}
+
+TEST_F(BadInput, NothingInAFileSteersTheTerminal) {
+  const fs::path sequence = Copy("copy\033[2J\r\x9b");
+  folder_.Write(sequence.filename() / "rgb.txt", "\033]0;title\007 \xc2\x9b 1.png\n");
+  const std::string line = Refusal(Run(sequence));
+  EXPECT_THAT(line, AllOf(HasSubstr("copy?[2J?"), HasSubstr("'?]0;title? ?")));
+  EXPECT_EQ(line.find_first_of("\033\r\007"), std::string::npos);
 }
 
 TEST_F(BadInput, NoReadableImageAtAll) {
@@ -152,6 +165,10 @@ TEST_F(BadInput, Configurations) {
   EXPECT_THAT(refusal("rotodom:\n  features:\n    max_features: many\n"),
               AllOf(HasSubstr("options.yaml:3: "), HasSubstr("whole number")));
   EXPECT_THAT(refusal("sequence: {stride: 0}\n"), HasSubstr("stride is 0"));
+  for (const std::string number : {".nan", ".inf"}) {
+    EXPECT_THAT(refusal("sequence: {fps: " + number + "}\n"), HasSubstr("fps"));
+  }
+  EXPECT_THAT(refusal("sequence: {stride: 99999999999}\n"), HasSubstr("whole number"));
   EXPECT_THAT(refusal("rotodom: {features: {max_features: 1}}\n"), HasSubstr("max_features is 1"));
   EXPECT_THAT(refusal("a: [\n"), HasSubstr("not YAML"));
   EXPECT_THAT(Refusal(Run(Good(), {"--config", "/nowhere.yaml"})), HasSubstr("/nowhere.yaml: "));
@@ -178,6 +195,83 @@ TEST_F(BadInput, AFolderInPlaceOfAResult) {
   EXPECT_THAT(Lines(result.error),
               ElementsAre(AllOf(StartsWith("rotslam: "), HasSubstr("summary.json"))));
   EXPECT_THAT(FileNames(Out()), Each(Not(EndsWith(".tmp"))));
+}
+
+// Root may do all things: what permissions refuse shows to somebody else only.
+TEST_F(BadInput, Permissions) {
+  const std::string nobody = "setpriv --reuid=65534 --regid=65534 --clear-groups";
+  const auto run = [&](const fs::path& sequence, const fs::path& out, const fs::path& camera) {
+    return Rotslam({"run",
+                    sequence.string(),
+                    "--out=" + out.string(),
+                    "--camera=" + camera.string(),
+                    "--quiet"},
+                   "",
+                   geteuid() == 0 ? nobody : "");
+  };
+  if (geteuid() == 0 && Rotslam({"--version"}, "", nobody).exit_code != 0) {
+    GTEST_SKIP() << "needs setpriv, and the program where others may run it";
+  }
+  const fs::path sequence = Copy();
+  const fs::path camera = folder_.Write("camera.yaml", ReadWholeFile(Good() / "camera.yaml"));
+  fs::permissions(folder_.path(), fs::perms::others_all, fs::perm_options::add);
+  const auto forbid = [](const fs::path& path) { fs::permissions(path, fs::perms::none); };
+
+  const fs::path read_only = folder_.path() / "read_only";
+  fs::create_directory(read_only);
+  fs::permissions(read_only, fs::perms(0555));
+  EXPECT_THAT(Refusal(run(sequence, read_only, camera)),
+              AllOf(StartsWith(read_only.string()), HasSubstr("Permission denied")));
+  EXPECT_THAT(Refusal(run(sequence, read_only / "below", camera)),
+              AllOf(StartsWith(read_only.string()), HasSubstr("Permission denied")));
+
+  forbid(camera);
+  EXPECT_THAT(Refusal(run(sequence, Out(), camera)), StartsWith(camera.string() + ": "));
+  fs::permissions(camera, fs::perms(0644));
+  forbid(sequence / "rgb.txt");
+  EXPECT_THAT(Refusal(run(sequence, Out(), camera)),
+              HasSubstr((sequence / "rgb.txt").string() + ": cannot be opened"));
+  fs::permissions(sequence / "rgb.txt", fs::perms(0644));
+  for (const fs::path& image : Images(sequence)) forbid(image);
+  EXPECT_THAT(Refusal(run(sequence, Out(), camera)), HasSubstr("file cannot be opened"));
+  forbid(sequence);
+  EXPECT_THAT(Refusal(run(sequence, Out(), camera)), StartsWith(sequence.string() + ": "));
+  fs::permissions(sequence, fs::perms::owner_all);
+}
+
+TEST_F(BadInput, ADiskThatTakesNoMore) {
+  // 10 kB a file: the pose graph is longer. The shell's signal would end the program.
+  const CommandResult result = Rotslam({"run",
+                                        Good().string(),
+                                        "--out=" + Out().string(),
+                                        "--no-report",
+                                        "--quiet",
+                                        "--checkpoint-every=0"},
+                                       "trap '' XFSZ; ulimit -f 20;",
+                                       "");
+  EXPECT_EQ(result.exit_code, 1);
+  EXPECT_THAT(Lines(result.error),
+              ElementsAre(AllOf(StartsWith("rotslam: " + Out().string()),
+                                HasSubstr("cannot write the file: File too large"))));
+  // What was complete is where the message says.
+  const fs::path outputs = Out() / "unfinished" / "outputs";
+  EXPECT_THAT(FileNames(outputs), Each(Not(EndsWith(".tmp"))));
+  EXPECT_EQ(ReadTrajectory(outputs / "rotations_tum.txt").size(), std::size_t{kNumFrames});
+}
+
+TEST_F(BadInput, AFullDisk) {
+  const std::string place = folder_.path().string() + "/disk";
+  fs::create_directory(place);
+  const std::string mount =
+      "unshare --mount sh -c 'mount -t tmpfs -o size=16k none " + place + " && exec \"$0\" \"$@\"'";
+  if (Rotslam({"--version"}, "", mount).exit_code != 0) GTEST_SKIP() << "needs to mount a tmpfs";
+  const CommandResult result = Rotslam(
+      {"run", Good().string(), "--out=" + place + "/out", "--no-report", "--quiet"}, "", mount);
+  EXPECT_EQ(result.exit_code, 1);
+  EXPECT_THAT(Lines(result.error),
+              ElementsAre(StartsWith("rotslam: warning: no checkpoints from here on: " + place),
+                          AllOf(StartsWith("rotslam: " + place + "/out"),
+                                HasSubstr("cannot write the file: No space left on device"))));
 }
 
 // ---- pictures that show nothing

@@ -32,7 +32,11 @@ inline std::string Quoted(const std::string& argument) {
 }
 
 /// Runs the built executable with these arguments.
-inline CommandResult Rotslam(const std::vector<std::string>& arguments) {
+/// @param setup   what the shell does before ("ulimit -f 100;").
+/// @param runner  a program that starts the executable, with its arguments.
+inline CommandResult Rotslam(const std::vector<std::string>& arguments,
+                             const std::string& setup,
+                             const std::string& runner) {
   const TemporaryFolder folder;
   const std::filesystem::path output = folder.path() / "output";
   const std::filesystem::path error = folder.path() / "error";
@@ -40,12 +44,16 @@ inline CommandResult Rotslam(const std::vector<std::string>& arguments) {
   for (const std::string& argument : arguments) command += " " + Quoted(argument);
   command += " >" + Quoted(output.string()) + " 2>" + Quoted(error.string());
   // The shell is replaced by the program, so that a signal is seen here.
-  const int status = std::system(("exec " + command).c_str());
+  const int status = std::system((setup + " exec " + runner + " " + command).c_str());
   CommandResult result;
   if (WIFEXITED(status)) result.exit_code = WEXITSTATUS(status);
   result.output = ReadWholeFile(output);
   result.error = ReadWholeFile(error);
   return result;
+}
+
+inline CommandResult Rotslam(const std::vector<std::string>& arguments) {
+  return Rotslam(arguments, "", "");
 }
 
 /// The same with one list behind another.

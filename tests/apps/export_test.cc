@@ -161,7 +161,7 @@ TEST_F(ExportTest, StellasDescriptorsTellItsLandmarksApart) {
                                "--to=stella",
                                "--images=" + elsewhere.string(),
                                "--out=" + (Out() / "map.msg").string()})),
-              HasSubstr("no such image"));
+              HasSubstr("file cannot be opened; --images names the folder"));
 }
 
 TEST_F(ExportTest, SaysWhatItCannotDo) {

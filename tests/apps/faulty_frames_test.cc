@@ -87,6 +87,22 @@ TEST_F(OneBadFrame, AnotherSize) {
                      "image is 320x120, the first readable one is 320x240");
 }
 
+TEST_F(FaultyFrames, AnotherSizeFromOneFrameOn) {
+  constexpr int kFirst = 19;
+  const CommandResult result = Run(CopyWith([](const cv::Mat& image, int frame) {
+    cv::Mat half;
+    cv::resize(image, half, {}, 0.5, 0.5, cv::INTER_AREA);
+    return frame >= kFirst ? half : image;
+  }));
+  EXPECT_THAT(Lines(result.error),
+              Contains(HasSubstr("image is 160x120")).Times(kNumFrames - kFirst));
+  const Trajectory trajectory = Result(result);
+  ASSERT_EQ(trajectory.size(), std::size_t{kNumFrames});
+  for (int n = kFirst; n < kNumFrames; ++n) {
+    EXPECT_LT(AngleDeg(trajectory[n].world_from_cam, trajectory[kFirst - 1].world_from_cam), 1e-9);
+  }
+}
+
 TEST_F(FaultyFrames, UnreadableFramesAtBothEnds) {
   const fs::path sequence = Copy();
   const std::vector<fs::path> images = Images(sequence);
@@ -150,6 +166,27 @@ TEST_F(FaultyFrames, SixteenBitsAndAlpha) {
     return bgra;
   });
   EXPECT_LT(LargestErrorDeg(Result(Run(alpha))), 0.2);
+}
+
+TEST_F(FaultyFrames, LinksInPlaceOfAllPaths) {
+  const fs::path sequence = Copy();
+  fs::rename(sequence / "rgb", folder_.path() / "elsewhere");
+  fs::create_directory(sequence / "rgb");
+  for (const auto& image : fs::directory_iterator(folder_.path() / "elsewhere")) {
+    fs::create_symlink(image.path(), sequence / "rgb" / image.path().filename());
+  }
+  fs::create_directory_symlink(sequence, folder_.path() / "link");
+  fs::create_directory(folder_.path() / "results");
+  fs::create_directory_symlink(folder_.path() / "results", Out());
+  EXPECT_LT(LargestErrorDeg(Result(Run(folder_.path() / "link"))), 0.2);
+  EXPECT_TRUE(fs::is_symlink(Out()));
+  // A link to itself, and one to nothing.
+  fs::remove(folder_.path() / "link");
+  fs::create_symlink("link", folder_.path() / "link");
+  EXPECT_THAT(Lines(Run(folder_.path() / "link").error), ElementsAre(HasSubstr("link: ")));
+  fs::remove(folder_.path() / "elsewhere" / Images(sequence)[10].filename());
+  EXPECT_THAT(Lines(Run(sequence).error),
+              ElementsAre(AllOf(HasSubstr("frame 10 "), HasSubstr("file cannot be opened"))));
 }
 
 TEST_F(FaultyFrames, PathsWithSpacesAndOtherScripts) {

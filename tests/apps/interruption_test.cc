@@ -1,9 +1,9 @@
 // Ctrl-C while a run works: what there is gets written, the program says so and ends with 130.
 
-#include <array>
 #include <chrono>
 #include <csignal>
 #include <filesystem>
+#include <fstream>
 #include <string>
 #include <vector>
 
@@ -12,6 +12,7 @@
 #include <nlohmann/json.hpp>
 
 #include "tests/apps/run_directory.h"
+#include "tests/apps/running_program.h"
 #include "tests/apps/small_sequence.h"
 
 namespace rotslam {
@@ -20,77 +21,6 @@ namespace {
 namespace fs = std::filesystem;
 using testing::ElementsAre;
 using testing::HasSubstr;
-
-// A program that runs beside the test, with its standard error at hand as it comes.
-class RunningProgram {
- public:
-  explicit RunningProgram(const std::vector<std::string>& arguments) {
-    std::vector<std::string> words = {ROTSLAM_EXECUTABLE};
-    words.insert(words.end(), arguments.begin(), arguments.end());
-    std::vector<char*> argv;
-    argv.reserve(words.size() + 1);
-    for (std::string& word : words) argv.push_back(word.data());
-    argv.push_back(nullptr);
-    std::array<int, 2> ends = {};
-    EXPECT_EQ(pipe(ends.data()), 0);
-    child_ = fork();
-    if (child_ == 0) {
-      // Whoever runs the tests in the background may have them ignored.
-      std::signal(SIGINT, SIG_DFL);
-      std::signal(SIGTERM, SIG_DFL);
-      dup2(ends[1], STDERR_FILENO);
-      close(ends[0]);
-      close(ends[1]);
-      execv(argv[0], argv.data());
-      _exit(127);
-    }
-    close(ends[1]);
-    error_ = ends[0];
-  }
-  ~RunningProgram() {
-    if (child_ > 0) kill(child_, SIGKILL);
-    Finish();
-  }
-  RunningProgram(const RunningProgram&) = delete;
-  RunningProgram& operator=(const RunningProgram&) = delete;
-
-  // Waits until standard error has shown `text`; false when the program ends without.
-  bool WaitFor(const std::string& text) {
-    while (shown_.find(text) == std::string::npos) {
-      if (!ReadMore()) return false;
-    }
-    return true;
-  }
-
-  void Send(int signal) const { kill(child_, signal); }
-  const std::string& shown() const { return shown_; }
-
-  // Exit code at the end; -1: a signal ended it.
-  int Finish() {
-    if (child_ <= 0) return exit_code_;
-    while (ReadMore()) {
-    }
-    close(error_);
-    int status = 0;
-    waitpid(child_, &status, 0);
-    child_ = -1;
-    exit_code_ = WIFEXITED(status) ? WEXITSTATUS(status) : -1;
-    return exit_code_;
-  }
-
- private:
-  bool ReadMore() {
-    std::array<char, 4096> buffer = {};
-    const ssize_t count = read(error_, buffer.data(), buffer.size());
-    if (count > 0) shown_.append(buffer.data(), static_cast<std::size_t>(count));
-    return count > 0;
-  }
-
-  pid_t child_ = -1;
-  int error_ = -1;
-  int exit_code_ = -1;
-  std::string shown_;
-};
 
 // The small sequence again and again: long enough to be in the middle of.
 class InterruptedRun : public SmallSequenceTest {
@@ -123,10 +53,14 @@ class InterruptedRun : public SmallSequenceTest {
 
   // What every interrupted run must have left.
   void ExpectOrientationsOfPart() const {
-    EXPECT_THAT(
-        FileNames(Out()),
-        ElementsAre(
-            "loops.csv", "rotations.csv", "rotations_tum.txt", "summary.json", "view_graph.g2o"));
+    EXPECT_THAT(FileNames(Out()),
+                ElementsAre("loops.csv",
+                            "rotations.csv",
+                            "rotations_tum.txt",
+                            "summary.json",
+                            "unfinished/frames.bin",
+                            "unfinished/state.bin",
+                            "view_graph.g2o"));
     const std::size_t count = ReadTrajectory(Out() / "rotations_tum.txt").size();
     EXPECT_GT(count, 5u);
     EXPECT_LT(count, std::size_t{kNumImages});
@@ -150,7 +84,25 @@ TEST_P(WithBothSignals, OrientationsSoFarAreWritten) {
     const std::size_t count = ReadTrajectory(Out() / "rotations_tum.txt").size();
     EXPECT_THAT(Lines(program.shown()).back(),
                 HasSubstr("interrupted after " + std::to_string(count) + " frames"));
+    EXPECT_THAT(Lines(program.shown()).back(), HasSubstr("--resume goes on from here"));
   }
+}
+
+TEST_F(InterruptedRun, ReplacesTheFilesOfARunBefore) {
+  // The good sequence, and what a program before this one might have left.
+  ASSERT_EQ(Run(Good(), {"--report"}).exit_code, 0);
+  std::ofstream(Out() / "pose_covariance.csv") << "old";
+  std::ofstream(Out() / "notes.txt") << "mine";
+  ASSERT_TRUE(fs::exists(Out() / "trajectory_tum.txt"));
+  RunningProgram program(Command("run", Long()));
+  ASSERT_TRUE(program.WaitFor("frame 10:")) << program.shown();
+  // As long as the new run has nothing to show, the old one is there.
+  EXPECT_TRUE(fs::exists(Out() / "trajectory_tum.txt"));
+  program.Send(SIGINT);
+  EXPECT_EQ(program.Finish(), 130) << program.shown();
+  EXPECT_EQ(ReadWholeFile(Out() / "notes.txt"), "mine");
+  fs::remove(Out() / "notes.txt");
+  ExpectOrientationsOfPart();
 }
 
 TEST_F(InterruptedRun, WhileItFindsPositionsTheOrientationsOfAllFramesStay) {

@@ -76,4 +76,19 @@ inline nlohmann::ordered_json ReadSummary(const std::filesystem::path& directory
   return nlohmann::ordered_json::parse(ReadWholeFile(directory / "summary.json"));
 }
 
+/// That two runs have left the same files with the same bytes, times in summary.json excepted.
+inline void ExpectSameRun(const std::filesystem::path& a, const std::filesystem::path& b) {
+  ASSERT_EQ(FileNames(a), FileNames(b));
+  for (const std::string& name : FileNames(a)) {
+    // Times are in both.
+    if (name == "summary.json" || name == "report.html") continue;
+    EXPECT_TRUE(ReadWholeFile(a / name) == ReadWholeFile(b / name)) << name;
+  }
+  nlohmann::ordered_json summary_a = ReadSummary(a);
+  nlohmann::ordered_json summary_b = ReadSummary(b);
+  EXPECT_EQ(summary_a.erase("seconds"), 1u);
+  EXPECT_EQ(summary_b.erase("seconds"), 1u);
+  EXPECT_EQ(summary_a.dump(), summary_b.dump());
+}
+
 }  // namespace rotslam

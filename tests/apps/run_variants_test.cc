@@ -90,20 +90,10 @@ TEST_F(RunVariants, SameBytesEveryTimeAndAtAnyNumberOfThreads) {
     fs::remove_all(folder_.path() / "sequence");
     const fs::path sequence = Simulate({"--width=320", "--height=240"}, kind);
     const fs::path first = Run(sequence, kind + "_1", {"--threads=1"});
-    for (const std::string threads : {"1", "2", "5"}) {
+    for (const std::string threads : {"1", "2", "4"}) {
       SCOPED_TRACE(threads + " threads");
       const fs::path again = Run(sequence, kind + "_again", {"--threads=" + threads});
-      ASSERT_EQ(FileNames(first), FileNames(again));
-      for (const std::string& name : FileNames(first)) {
-        if (name == "summary.json") continue;
-        EXPECT_TRUE(ReadWholeFile(first / name) == ReadWholeFile(again / name)) << name;
-      }
-      nlohmann::ordered_json a = ReadSummary(first);
-      nlohmann::ordered_json b = ReadSummary(again);
-      EXPECT_TRUE(a.contains("seconds"));
-      a.erase("seconds");
-      b.erase("seconds");
-      EXPECT_EQ(a.dump(), b.dump());
+      ExpectSameRun(first, again);
     }
   }
 }

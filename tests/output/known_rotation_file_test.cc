@@ -192,7 +192,7 @@ TEST(KnownRotationFile, SaysWhatIsWrongWithColmapModels) {
     EXPECT_THAT(
         RuntimeErrorOf([&] { ReadKnownRotation(text); }),
         HasSubstr(std::string(name) == "images.txt" ? "neither known_rotation.txt"
-                                                    : std::string(name) + ": no such file"));
+                                                    : std::string(name) + ": No such file"));
   }
 
   // A binary model cut anywhere is refused, and never believed about its counts.

@@ -85,7 +85,7 @@ TEST(RunMap, BelievesNoBrokenFile) {
   EXPECT_THAT(RuntimeErrorOf([&] { ReadRunMap(folder.path() / "text.bin"); }),
               HasSubstr("is not a map"));
   EXPECT_THAT(RuntimeErrorOf([&] { ReadRunMap(folder.path() / "none.bin"); }),
-              HasSubstr("no such file"));
+              HasSubstr("No such file"));
 }
 
 TEST(RunMap, KeyframesKeepTheirSightingsOnly) {

@@ -12,6 +12,7 @@
 
 #include <gtest/gtest.h>
 
+#include "rotodom/loop/frame_record.h"
 #include "tests/rotodom/features/textured_world.h"
 
 namespace rotslam {
@@ -255,6 +256,119 @@ TEST(LoopedOdometry, GivesTheSameBytesOnTwoThreads) {
     EXPECT_EQ(run.accepted[k].match, WholeRun().accepted[k].match);
     EXPECT_EQ(run.accepted[k].angle_deg, WholeRun().accepted[k].angle_deg);
   }
+}
+
+// All that a run knows, as bytes.
+std::string BytesOf(OdometryResult result) {
+  ArchiveWriter archive;
+  archive(result.graph, result.cam_from_world, result.edge_matches, result.features);
+  archive(result.covariance);
+  return archive.TakeBytes();
+}
+
+template <class Value>
+std::string ToBytes(Value value) {
+  ArchiveWriter archive;
+  archive(value);
+  return archive.TakeBytes();
+}
+
+template <class Value>
+Value FromBytes(const std::string& bytes) {
+  Value value;
+  ArchiveReader archive(bytes);
+  archive(value);
+  archive.ExpectEnd();
+  return value;
+}
+
+struct Remembering {
+  const char* name;
+  double readout_s;
+  bool keep_features;
+  int num_threads;  // of the one that goes on
+};
+std::ostream& operator<<(std::ostream& stream, const Remembering& remembering) {
+  return stream << remembering.name;
+}
+
+class GoingOn : public testing::TestWithParam<Remembering> {
+ protected:
+  static LoopedOdometry Make(int num_threads) {
+    Camera camera = SmallCamera();
+    camera.readout_s = GetParam().readout_s;
+    LoopOptions loops;
+    loops.min_correction_deg = 0.0;  // every loop is averaged
+    loops.handover_frames = 3;
+    return LoopedOdometry(
+        camera, FewFeatures(), loops, nullptr, GetParam().keep_features, 1, num_threads);
+  }
+};
+INSTANTIATE_TEST_SUITE_P(LoopedOdometry,
+                         GoingOn,
+                         testing::Values(Remembering{"Tracks", 0.0, true, 1},
+                                         Remembering{"TwoThreads", 0.0, true, 2},
+                                         Remembering{"NoTracks", 0.0, false, 1},
+                                         Remembering{"RollingShutter", 0.002, true, 1}),
+                         testing::PrintToStringParamName());
+
+TEST_P(GoingOn, IsTheSameToTheLastBit) {
+  const int count = static_cast<int>(Images().size());
+  // The image of one of the first frames could not be read.
+  const auto image = [](int frame) { return frame == 7 ? cv::Mat() : Images()[frame]; };
+  LoopedOdometry whole = Make(1);
+  std::vector<std::string> records;
+  std::vector<std::string> states;
+  std::vector<LoopedEstimate> estimates;
+  int num_loops = 0;
+  for (int k = 0; k < count; ++k) {
+    FrameRecord record;
+    estimates.push_back(whole.AddFrame(FrameId{k}, k / kFps, image(k), &record));
+    num_loops += static_cast<int>(record.loops.connections.size());
+    records.push_back(ToBytes(std::move(record)));
+    states.push_back(whole.SaveState());
+  }
+  whole.Finish();
+  EXPECT_GT(num_loops, 0);
+  EXPECT_TRUE(std::any_of(estimates.begin(), estimates.end(), [](const LoopedEstimate& estimate) {
+    return estimate.has_averaged;
+  }));
+  // While an averaging runs, too, which is the case in the last ones.
+  for (const int stop : {1, 8, count - 3, count - 1, count}) {
+    SCOPED_TRACE(stop);
+    LoopedOdometry resumed = Make(GetParam().num_threads);
+    for (int k = 0; k < count; ++k) {
+      const LoopedEstimate estimate = k < stop ? resumed.Replay(FromBytes<FrameRecord>(records[k]))
+                                               : resumed.AddFrame(FrameId{k}, k / kFps, image(k));
+      EXPECT_EQ(ToBytes(estimate.cam_from_world), ToBytes(estimates[k].cam_from_world)) << k;
+      EXPECT_EQ(ToBytes(estimate.covariance), ToBytes(estimates[k].covariance)) << k;
+      EXPECT_EQ(ToBytes(estimate.loops), ToBytes(estimates[k].loops)) << k;
+      if (k + 1 == stop) resumed.RestoreState(states[k]);
+    }
+    resumed.Finish();
+    EXPECT_EQ(resumed.num_places(), whole.num_places());
+    EXPECT_TRUE(BytesOf(resumed.result()) == BytesOf(whole.result()));
+  }
+}
+
+TEST(LoopedOdometry, ANewOneStandsWhereNothingHasBeenSeen) {
+  LoopedOdometry odometry(SmallCamera(), FewFeatures(), {}, nullptr, true, 1, 1);
+  const std::string state = odometry.SaveState();
+  odometry.RestoreState(state);
+  EXPECT_EQ(odometry.SaveState(), state);
+}
+
+TEST(LoopedOdometry, NoticesAStateThatIsCutShort) {
+  LoopedOdometry odometry(SmallCamera(), FewFeatures(), {}, nullptr, true, 1, 1);
+  for (int k = 0; k < 6; ++k) odometry.AddFrame(FrameId{k}, k / kFps, Images()[k]);
+  const std::string state = odometry.SaveState();
+  odometry.RestoreState(state);
+  const std::string again = odometry.SaveState();
+  EXPECT_TRUE(again == state);
+  for (std::size_t size = 0; size < state.size(); size += 997) {
+    EXPECT_THROW(odometry.RestoreState(state.substr(0, size)), std::runtime_error) << size;
+  }
+  EXPECT_THROW(odometry.RestoreState(state + "x"), std::runtime_error);
 }
 
 TEST(LoopedOdometry, KnowsEveryFramesCovariance) {

@@ -154,6 +154,24 @@ TEST_F(LayoutTest, TumRgbd) {
   EXPECT_THAT(Complaint(folder_), HasSubstr("rgb.txt: lists no images"));
 }
 
+TEST_F(LayoutTest, ListsMayCountFrom1970InSmallerUnits) {
+  for (const char* zeros : {"", "000", "000000"}) {
+    const std::string unit = zeros;
+    WriteText("rgb.txt", "1305031102175" + unit + " a.png\n1305031102211" + unit + "\tb.png\n");
+    EXPECT_THAT(Times(FindLayout(folder_, 10.0)), ElementsAre(1305031102.175, 1305031102.211));
+  }
+  // One that is no such number, and none is.
+  WriteText("rgb.txt", "1305031102175 a.png\n1305031102211.5 b.png\n");
+  EXPECT_THAT(Times(FindLayout(folder_, 10.0)), ElementsAre(1305031102175.0, 1305031102211.5));
+}
+
+TEST_F(LayoutTest, NumbersThatAreNoTimes) {
+  for (const std::string word : {"nan", "inf", "-inf", "1e999", "0x10", "1,5", "1.5s", ""}) {
+    WriteText("rgb.txt", "0.5 a.png\n" + word + " b.png\n");
+    EXPECT_THAT(Complaint(folder_), HasSubstr("rgb.txt: line 2 is '" + word)) << word;
+  }
+}
+
 TEST_F(LayoutTest, Euroc) {
   WriteText("mav0/cam0/data.csv",
             "#timestamp [ns],filename\r\n1403715273262142976,1403715273262142976.png\r\n"

@@ -1,6 +1,9 @@
 #include "rotodom/sequence/sequence.h"
 
+#include <bitset>
+#include <cstdint>
 #include <fstream>
+#include <initializer_list>
 #include <limits>
 #include <stdexcept>
 #include <string>
@@ -18,6 +21,7 @@ namespace {
 
 using testing::ElementsAre;
 using testing::HasSubstr;
+using testing::SizeIs;
 
 std::vector<Frame> ReadAll(Sequence& sequence) {
   std::vector<Frame> frames;
@@ -94,6 +98,32 @@ TEST_F(SequenceTest, MayBeLeftInTheMiddle) {
   const std::optional<Frame> kept = sequence->Next();
   ASSERT_TRUE(sequence->Next());
   EXPECT_EQ(kept->image.at<unsigned char>(3, 4), 0);  // its pixels are its own
+}
+
+TEST_F(SequenceTest, Skips) {
+  WriteTen();
+  SequenceOptions options;
+  options.first = 1;
+  options.stride = 2;
+  const auto sequence = OpenSequence(folder_, options);
+  ASSERT_TRUE(sequence->Next());  // and the next one is being decoded
+  sequence->Skip(2);
+  const std::optional<Frame> frame = sequence->Next();
+  ASSERT_TRUE(frame);
+  EXPECT_EQ(frame->id, FrameId{3});
+  EXPECT_EQ(frame->name, "7.png");
+  EXPECT_EQ(frame->image.at<unsigned char>(3, 4), 70);
+  sequence->Skip(100);
+  EXPECT_FALSE(sequence->Next());
+}
+
+TEST_F(SequenceTest, NamesItsFiles) {
+  WriteTen();
+  SequenceOptions options;
+  options.first = 2;
+  options.stride = 5;
+  EXPECT_THAT(OpenSequence(folder_, options)->Files(),
+              ElementsAre(folder_ / "2.png", folder_ / "7.png"));
 }
 
 TEST_F(SequenceTest, TakesFirstLastAndStride) {
@@ -199,6 +229,97 @@ TEST_F(SequenceTest, MissingFilesOfAListAreUnreadableFrames) {
   EXPECT_EQ(frames[2].timestamp_s, 3.0);
 }
 
+TEST_F(SequenceTest, AFolderInAListIsAnUnreadableFrame) {
+  WriteText("rgb.txt", "1.0 a.png\n2.0 b.png\n");
+  WriteImage("a.png");
+  std::filesystem::create_directory(folder_ / "b.png");
+  const auto sequence = OpenSequence(folder_, {});
+  const std::vector<Frame> frames = ReadAll(*sequence);
+  ASSERT_EQ(frames.size(), 2u);
+  EXPECT_EQ(frames[1].problem, "file cannot be opened");
+}
+
+// As OpenCV cannot write them: four components, each all 128 but for the first where `is_inked`.
+std::string CmykJpeg(int width, int height, bool is_inked) {
+  const auto bytes = [](std::initializer_list<int> list) {
+    return std::string(list.begin(), list.end());
+  };
+  std::string jpeg = bytes({0xff, 0xd8, 0xff, 0xdb, 0, 67, 0}) + std::string(64, 1);
+  jpeg += bytes({0xff, 0xc0, 0, 20, 8, height / 256, height % 256, width / 256, width % 256, 4});
+  for (int k = 1; k <= 4; ++k) jpeg += bytes({k, 0x11, 0});
+  // Codes of DC differences: 0 for none, 10 for those of 11 bits; of AC: 0 for "the rest is zero".
+  jpeg += bytes({0xff, 0xc4, 0, 21, 0x00, 1, 1, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 11});
+  jpeg += bytes({0xff, 0xc4, 0, 20, 0x10, 1, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0});
+  jpeg += bytes({0xff, 0xda, 0, 14, 4, 1, 0, 2, 0, 3, 0, 4, 0, 0, 63, 0});
+  const int num_blocks = ((width + 7) / 8) * ((height + 7) / 8);
+  std::string bits = is_inked ? "10011111111110" : "00";  // -1024 or no difference
+  for (int k = 1; k < 4 * num_blocks; ++k) bits += "00";
+  bits.resize((bits.size() + 7) / 8 * 8, '1');
+  for (std::size_t at = 0; at < bits.size(); at += 8) {
+    const int byte = static_cast<int>(std::bitset<8>(bits.substr(at, 8)).to_ulong());
+    jpeg += bytes({byte});
+    if (byte == 0xff) jpeg += bytes({0});
+  }
+  return jpeg + bytes({0xff, 0xd9});
+}
+
+// A small picture whose header says another size, all checksums right.
+std::string PngThatSays(std::uint32_t width, std::uint32_t height) {
+  std::vector<unsigned char> bytes;
+  EXPECT_TRUE(cv::imencode(".png", cv::Mat::zeros(12, 16, CV_8UC1), bytes));
+  const auto put = [&](std::size_t at, std::uint32_t value) {
+    for (int k = 0; k < 4; ++k) bytes[at + k] = static_cast<unsigned char>(value >> (24 - 8 * k));
+  };
+  put(16, width);
+  put(20, height);
+  std::uint32_t crc = 0xffffffff;
+  for (std::size_t at = 12; at < 29; ++at) {
+    crc ^= bytes[at];
+    for (int bit = 0; bit < 8; ++bit) crc = (crc >> 1) ^ ((crc & 1) != 0 ? 0xedb88320 : 0);
+  }
+  put(29, ~crc);
+  return {bytes.begin(), bytes.end()};
+}
+
+TEST_F(SequenceTest, TakesFourInks) {
+  WriteText("0.jpg", CmykJpeg(40, 24, true));
+  const std::vector<Frame> frames = ReadAll(*OpenSequence(folder_, {}));
+  ASSERT_EQ(frames.size(), 1u);
+  EXPECT_EQ(frames[0].problem, "");
+  ASSERT_EQ(frames[0].image.type(), CV_8UC3);
+  EXPECT_EQ(frames[0].image.size(), cv::Size(40, 24));
+  // Adobe's inks are stored the wrong way round: 0 is all of the ink.
+  const cv::Vec3b pixel = frames[0].image.at<cv::Vec3b>(10, 10);
+  EXPECT_LT(pixel[2], pixel[1]);
+}
+
+TEST_F(SequenceTest, ReadsHundredMegapixels) {
+  WriteImage("0.png", cv::Scalar::all(77), CV_8UC1, {11600, 8700});
+  WriteImage("1.jpg", cv::Scalar::all(77), CV_8UC1, {11600, 8700});
+  const std::vector<Frame> frames = ReadAll(*OpenSequence(folder_, {}));
+  ASSERT_EQ(frames.size(), 2u);
+  for (const Frame& frame : frames) {
+    EXPECT_EQ(frame.problem, "");
+    EXPECT_EQ(frame.image.size(), cv::Size(11600, 8700));
+  }
+}
+
+// The files are whole but for the size in their headers, which is beyond what they can hold.
+TEST_F(SequenceTest, BelievesNoSizeThatTheFileCannotHold) {
+  std::string jpeg = CmykJpeg(40, 24, false);
+  const std::size_t frame = jpeg.find("\xff\xc0");
+  jpeg.replace(frame + 5, 4, "\x6f\xff\x6f\xff");
+  WriteText("0.jpg", jpeg);
+  WriteImage("1.png");
+  WriteText("2.png", PngThatSays(28671, 28671));
+  const auto sequence = OpenSequence(folder_, {});
+  const std::vector<Frame> frames = ReadAll(*sequence);
+  ASSERT_EQ(frames.size(), 3u);
+  EXPECT_EQ(frames[0].problem, "JPEG data are cut off");
+  EXPECT_EQ(frames[1].problem, "");
+  EXPECT_EQ(frames[2].problem, "PNG data are cut off");
+}
+
 TEST_F(SequenceTest, BringsEveryPixelFormatToEightBits) {
   WriteImage("0.png", cv::Scalar(10, 20, 30), CV_8UC3);
   WriteImage("1.png", cv::Scalar(10, 20, 30, 128), CV_8UC4);
@@ -284,6 +405,15 @@ TEST_F(SequenceTest, Video) {
   EXPECT_NEAR(cv::mean(frames[1].image)[0], 140.0, 4.0);
   EXPECT_EQ(sequence->NumFrames(), 2);
   EXPECT_FALSE(sequence->Next());
+
+  sequence = OpenSequence(folder_ / "film.avi", options);
+  EXPECT_THAT(sequence->Files(), ElementsAre(folder_ / "film.avi"));
+  sequence->Skip(1);
+  frames = ReadAll(*sequence);
+  EXPECT_THAT(Names(frames), ElementsAre("000007"));
+  EXPECT_EQ(frames[0].id, FrameId{1});
+  EXPECT_NEAR(cv::mean(frames[0].image)[0], 140.0, 4.0);
+  EXPECT_THAT(sequence->timestamps_s(), SizeIs(2));
 
   options.last = std::numeric_limits<int>::max();
   options.stride = std::numeric_limits<int>::max();
