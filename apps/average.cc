@@ -12,6 +12,7 @@
 #include "output/rotation_list.h"
 #include "rotodom/averaging/certificate.h"
 #include "rotodom/averaging/global_averaging.h"
+#include "rotodom/types/stopwatch.h"
 
 namespace rotslam {
 namespace {
@@ -24,10 +25,6 @@ struct AverageFlags {
   bool use_start = false;
   bool certify = false;
 };
-
-double SecondsSince(std::chrono::steady_clock::time_point start) {
-  return std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
-}
 
 void PrintRow(const char* name, const std::string& value, const std::string& meaning) {
   std::printf("%-14s %14s  %s\n", name, value.c_str(), meaning.c_str());

@@ -40,12 +40,12 @@ std::size_t KeyDistance(const std::string& key, const std::string& known) {
 }
 
 // What OverrideOptions knows about its keys: options, and the groups they lie in.
-struct Vocabulary {
+struct KnownKeys {
   std::map<std::string, const OptionRef*> option_of;
   std::set<std::string> groups;
   std::vector<std::string> keys;  // of the options, in their order
 
-  explicit Vocabulary(const std::vector<OptionRef>& options) {
+  explicit KnownKeys(const std::vector<OptionRef>& options) {
     for (const OptionRef& option : options) {
       option_of[option.key] = &option;
       keys.push_back(option.key);
@@ -110,7 +110,7 @@ bool Assign(const YAML::Node& node, Field& field) {
 
 class Loader {
  public:
-  Loader(const std::filesystem::path& path, const Vocabulary& vocabulary)
+  Loader(const std::filesystem::path& path, const KnownKeys& vocabulary)
       : path_(path), vocabulary_(vocabulary) {}
 
   void LoadGroup(const YAML::Node& map, const std::string& group) const {
@@ -154,7 +154,7 @@ class Loader {
   }
 
   const std::filesystem::path& path_;
-  const Vocabulary& vocabulary_;
+  const KnownKeys& vocabulary_;
 };
 
 }  // namespace
@@ -174,7 +174,7 @@ YAML::Node ReadYaml(const std::filesystem::path& path, const std::string& what) 
 }
 
 std::string UnknownOption(const std::string& key, const std::vector<OptionRef>& options) {
-  return Vocabulary(options).Unknown(key);
+  return KnownKeys(options).Unknown(key);
 }
 
 void OverrideOptions(const std::filesystem::path& path, const std::vector<OptionRef>& options) {
@@ -185,7 +185,7 @@ void OverrideOptions(const std::filesystem::path& path,
                      const YAML::Node& map,
                      const std::vector<OptionRef>& options) {
   if (!map.IsDefined() || map.IsNull()) return;
-  const Vocabulary vocabulary(options);
+  const KnownKeys vocabulary(options);
   const Loader loader(path, vocabulary);
   if (!map.IsMap()) loader.Refuse(map, "expected options as `name: value`");
   loader.LoadGroup(map, "");

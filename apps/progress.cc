@@ -15,6 +15,8 @@
 #include <sys/ioctl.h>
 #include <unistd.h>
 
+#include "rotodom/types/stopwatch.h"
+
 namespace rotslam {
 namespace {
 
@@ -31,10 +33,6 @@ constexpr const char* kLogName = "rotslam";
 constexpr const char* kBold = "1";
 constexpr const char* kRed = "1;31";
 constexpr const char* kYellow = "1;33";
-
-double SecondsSince(std::chrono::steady_clock::time_point start) {
-  return std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
-}
 
 std::string Environment(const char* name) {
   const char* value = std::getenv(name);  // NOLINT(concurrency-mt-unsafe): nobody sets it

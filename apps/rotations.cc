@@ -13,6 +13,7 @@
 #include "apps/run_directory.h"
 #include "apps/run_report.h"
 #include "apps/unfinished.h"
+#include "rotodom/types/stopwatch.h"
 
 namespace rotslam {
 namespace {
@@ -53,8 +54,7 @@ int FindAndWriteRotations(const RotationsFlags& flags) {
   const UnfinishedOutputs outputs(directory);
   WriteOrientations(outputs.folder(), orientations);
   RunSummary summary = StartSummary("rotations", input, orientations, DescribeOptions(options));
-  summary.seconds.push_back(
-      {"total", std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count()});
+  summary.seconds.push_back({"total", SecondsSince(start)});
   WriteSummary(outputs.folder() / "summary.json", summary);
   outputs.Publish();
   if (input.guess) progress.Warn(WarningOf(*input.guess, input.camera));

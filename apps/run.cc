@@ -16,6 +16,7 @@
 #include "apps/unfinished.h"
 #include "output/ply.h"
 #include "output/trajectory.h"
+#include "rotodom/types/stopwatch.h"
 
 namespace rotslam {
 namespace {
@@ -30,10 +31,6 @@ struct RunFlags {
   bool ascii = false;
   bool use_report = true;
 };
-
-double SecondsSince(Clock::time_point start) {
-  return std::chrono::duration<double>(Clock::now() - start).count();
-}
 
 int Run(const RunFlags& flags) {
   const Clock::time_point start = Clock::now();

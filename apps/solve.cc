@@ -25,6 +25,7 @@
 #include "output/trajectory.h"
 #include "rotodom/averaging/global_averaging.h"
 #include "rotodom/tracks/keyframes.h"
+#include "rotodom/types/stopwatch.h"
 
 namespace rotslam {
 namespace {
@@ -38,10 +39,6 @@ struct SolveFlags {
   std::string relative_rotations;
   std::string out;
 };
-
-double SecondsSince(Clock::time_point start) {
-  return std::chrono::duration<double>(Clock::now() - start).count();
-}
 
 // Orientations from relative ones, in place of the input's. What the graph does not tie to most of
 // the views leaves the input: orientations of separate pieces have nothing to do with each other.

@@ -10,14 +10,11 @@
 #include "ba/classification.h"
 #include "ba/lens.h"
 #include "ba/minimisation.h"
+#include "rotodom/types/stopwatch.h"
 #include "rotodom/types/triangulation.h"
 
 namespace rotslam {
 namespace {
-
-double SecondsSince(std::chrono::steady_clock::time_point start) {
-  return std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
-}
 
 bool AllFinite(const BundleState& state) {
   return std::all_of(state.centers.begin(), state.centers.end(), [](const Eigen::Vector3d& center) {

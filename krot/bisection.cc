@@ -9,6 +9,7 @@
 #include "krot/bracket_search.h"
 #include "krot/working_set.h"
 #include "rotodom/types/options.h"
+#include "rotodom/types/stopwatch.h"
 
 namespace rotslam {
 namespace {
@@ -167,7 +168,7 @@ BisectionResult MinimiseMaxResidual(const MinimaxProblem& problem,
     if (BoxResidual(problem, result.structure, problem.observations[o]) < active) continue;
     result.active.push_back(o);
   }
-  result.seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count();
+  result.seconds = SecondsSince(begin);
   return result;
 }
 

@@ -15,6 +15,7 @@
 #include "krot/named_problem.h"
 #include "krot/track_points.h"
 #include "rotodom/types/median.h"
+#include "rotodom/types/stopwatch.h"
 
 namespace rotslam {
 namespace {
@@ -336,8 +337,7 @@ KrotSolution SolveKnownRotation(const RotationMap& cam_from_world,
             [](const RemovedObservation& a, const RemovedObservation& b) {
               return std::tie(a.track, a.frame, a.reason) < std::tie(b.track, b.frame, b.reason);
             });
-  solution.seconds =
-      std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count();
+  solution.seconds = SecondsSince(begin);
   return solution;
 }
 

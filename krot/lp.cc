@@ -12,6 +12,7 @@
 
 #ifdef ROTSLAM_WITH_GLPK
 #include "krot/lp_glpk.h"
+#include "rotodom/types/stopwatch.h"
 #endif
 
 namespace rotslam {
@@ -163,7 +164,7 @@ LpResult SolveLp(const LinearProgram& program, const LpOptions& options) {
   for (std::size_t c = 0; c < result.primal.size(); ++c) {
     result.objective += program.cost[c] * result.primal[c];
   }
-  result.seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
+  result.seconds = SecondsSince(start);
   return result;
 }
 

@@ -9,6 +9,7 @@
 #include "krot/named_problem.h"
 #include "krot/selection.h"
 #include "krot/track_points.h"
+#include "rotodom/types/stopwatch.h"
 
 namespace rotslam {
 namespace {
@@ -240,8 +241,7 @@ KrotSolution ExtendKnownRotation(const KrotSolution& known,
     solution.status = KrotStatus::kIterationLimit;
     solution.message = std::to_string(placed.size()) + " views placed on known ones";
   }
-  solution.seconds =
-      std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count();
+  solution.seconds = SecondsSince(begin);
   return solution;
 }
 

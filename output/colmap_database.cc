@@ -23,7 +23,6 @@ namespace {
 
 namespace fs = std::filesystem;
 
-constexpr int kCameraId = 1;
 constexpr int kCalibrated = 2;
 constexpr int kPanoramic = 5;
 // COLMAP's number for a pair of images is this times the smaller id, plus the larger one.
@@ -196,7 +195,7 @@ void InsertImages(const Database& database, const RunMap& map) {
   BinaryWriter parameters;
   for (const double value : camera.parameters) parameters.Put(value);
   Insertion(database, "INSERT INTO cameras VALUES (?, ?, ?, ?, ?, 1)")
-      .Integer(kCameraId)
+      .Integer(kColmapCameraId)
       .Integer(camera.model_id)
       .Integer(map.camera.width)
       .Integer(map.camera.height)
@@ -205,7 +204,7 @@ void InsertImages(const Database& database, const RunMap& map) {
   Insertion image(database, "INSERT INTO images (image_id, name, camera_id) VALUES (?, ?, ?)");
   Insertion corners(database, "INSERT INTO keypoints VALUES (?, ?, 2, ?)");
   for (const MapFrame& frame : map.frames) {
-    image.Integer(ColmapImageId(frame.id)).Text(frame.image).Integer(kCameraId).Run();
+    image.Integer(ColmapImageId(frame.id)).Text(frame.image).Integer(kColmapCameraId).Run();
     BinaryWriter pixels;
     const std::vector<MapKeypoint>& list = keypoints.at(frame.id);
     for (const MapKeypoint& keypoint : list) {

@@ -15,14 +15,13 @@
 
 #include "output/binary_file.h"
 #include "output/text_file.h"
+#include "output/unit_length.h"
 #include "rotodom/camera/read_camera.h"
 
 namespace rotslam {
 namespace {
 
 namespace fs = std::filesystem;
-
-constexpr double kMaxNormError = 1e-2;
 
 struct Image {
   std::vector<Eigen::Vector2d> keypoints_px;  // COLMAP's pixel centres
@@ -59,7 +58,7 @@ class ModelBuilder {
     const Eigen::Quaterniond q(qvec_tvec[0], qvec_tvec[1], qvec_tvec[2], qvec_tvec[3]);
     const Eigen::Vector3d t(qvec_tvec[4], qvec_tvec[5], qvec_tvec[6]);
     if (!q.coeffs().allFinite() || !t.allFinite()) Fail(file, who + ": its pose is not finite");
-    if (!(std::abs(q.norm() - 1.0) < kMaxNormError)) {
+    if (!IsUnitLength(q.norm())) {
       Fail(file, who + ": its quaternion is not of length 1");
     }
     for (const Eigen::Vector2d& keypoint_px : image.keypoints_px) {

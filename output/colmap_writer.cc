@@ -17,7 +17,6 @@ namespace {
 
 namespace fs = std::filesystem;
 
-constexpr int kCameraId = 1;
 constexpr double kPixelCentre = 0.5;
 
 std::array<double, 7> PoseNumbers(const MapFrame& frame) {
@@ -36,7 +35,7 @@ std::string BinaryCameras(const RunMap& map) {
   const ColmapCamera camera = ToColmap(map.camera);
   BinaryWriter writer;
   writer.Put(std::uint64_t{1});
-  writer.Put(std::uint32_t{kCameraId});
+  writer.Put(std::uint32_t{kColmapCameraId});
   writer.Put(static_cast<std::int32_t>(camera.model_id));
   writer.Put(static_cast<std::uint64_t>(map.camera.width));
   writer.Put(static_cast<std::uint64_t>(map.camera.height));
@@ -51,7 +50,7 @@ std::string BinaryImages(const RunMap& map,
   for (const MapFrame& frame : map.frames) {
     writer.Put(static_cast<std::uint32_t>(ColmapImageId(frame.id)));
     for (const double value : PoseNumbers(frame)) writer.Put(value);
-    writer.Put(std::uint32_t{kCameraId});
+    writer.Put(std::uint32_t{kColmapCameraId});
     writer.PutName(frame.image);
     const std::vector<MapKeypoint>& list = keypoints.at(frame.id);
     writer.Put(static_cast<std::uint64_t>(list.size()));
@@ -91,9 +90,9 @@ void Add(std::string& text, double value) { text += FormatNumber(" %.17g", value
 
 std::string TextCameras(const RunMap& map) {
   const ColmapCamera camera = ToColmap(map.camera);
-  std::string text = "# CAMERA_ID MODEL WIDTH HEIGHT PARAMETERS\n" + std::to_string(kCameraId) +
-                     " " + camera.model + " " + std::to_string(map.camera.width) + " " +
-                     std::to_string(map.camera.height);
+  std::string text = "# CAMERA_ID MODEL WIDTH HEIGHT PARAMETERS\n" +
+                     std::to_string(kColmapCameraId) + " " + camera.model + " " +
+                     std::to_string(map.camera.width) + " " + std::to_string(map.camera.height);
   for (const double value : camera.parameters) Add(text, value);
   return text + "\n";
 }
@@ -105,7 +104,7 @@ std::string TextImages(const RunMap& map,
   for (const MapFrame& frame : map.frames) {
     text += std::to_string(ColmapImageId(frame.id));
     for (const double value : PoseNumbers(frame)) Add(text, value);
-    text += " " + std::to_string(kCameraId) + " " + frame.image + "\n";
+    text += " " + std::to_string(kColmapCameraId) + " " + frame.image + "\n";
     std::string line;
     for (const MapKeypoint& keypoint : keypoints.at(frame.id)) {
       const Track& track = map.tracks[keypoint.track].track;

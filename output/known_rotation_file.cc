@@ -11,6 +11,7 @@
 #include "output/atomic_file.h"
 #include "output/colmap_model.h"
 #include "output/text_file.h"
+#include "output/unit_length.h"
 #include "rotodom/types/median.h"
 
 namespace rotslam {
@@ -19,7 +20,6 @@ namespace {
 namespace fs = std::filesystem;
 
 constexpr const char* kMagic = "rotslam_known_rotation";
-constexpr double kMaxNormError = 1e-2;
 
 // Rows of a file, taken one by one, their words likewise.
 class RowReader {
@@ -103,7 +103,7 @@ void ReadViewRow(RowReader& reader, KnownRotationInput& input) {
   const double timestamp_s = reader.Number();
   Eigen::Vector4d q;
   for (int k = 0; k < 4; ++k) q[k] = reader.Number();
-  if (!(std::abs(q.norm() - 1.0) < kMaxNormError)) reader.Fail("the quaternion is not of length 1");
+  if (!IsUnitLength(q.norm())) reader.Fail("the quaternion is not of length 1");
   const double sigma_deg = reader.Number();
   if (sigma_deg < 0.0) reader.Fail("sigma is negative");
   const Rotation world_from_cam(Eigen::Quaterniond(q[3], q[0], q[1], q[2]));

@@ -25,7 +25,7 @@ Json CameraToJson(const Camera& camera) {
 }
 
 // Four rows of four.
-Json PoseToJson(const MapFrame& frame) {
+Json WorldFromCamera(const MapFrame& frame) {
   Eigen::Matrix3d R_w_c = frame.cam_from_world.Inverse().Matrix();
   R_w_c.rightCols<2>() *= -1.0;
   Json rows = Json::array();
@@ -49,7 +49,7 @@ void WriteNerfTransforms(const std::filesystem::path& path,
   json["frames"] = Json::array();
   for (const MapFrame& frame : map.frames) {
     json["frames"].push_back({{"file_path", (images / frame.image).generic_string()},
-                              {"transform_matrix", PoseToJson(frame)}});
+                              {"transform_matrix", WorldFromCamera(frame)}});
   }
   ReplaceFile(path, json.dump(1, ' ', false, Json::error_handler_t::replace) + "\n");
 }

@@ -1,23 +1,22 @@
 #include "output/orientation_file.h"
 
 #include <algorithm>
-#include <cmath>
 #include <stdexcept>
 #include <string>
 
 #include "output/text_file.h"
+#include "output/unit_length.h"
 
 namespace rotslam {
 namespace {
 
-constexpr double kMaxNormError = 1e-2;
 constexpr std::size_t kTumColumns = 8;
 constexpr std::size_t kCsvColumns = 11;
 
 Rotation RotationAt(const std::filesystem::path& path, const TextRow& row, std::size_t first) {
   Eigen::Vector4d q;
   for (int k = 0; k < 4; ++k) q[k] = NumberAt(path, row, first + k);
-  if (!(std::abs(q.norm() - 1.0) < kMaxNormError)) {
+  if (!IsUnitLength(q.norm())) {
     throw std::runtime_error(AtLine(path,
                                     row.line,
                                     "the quaternion is of length " +

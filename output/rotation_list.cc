@@ -14,6 +14,7 @@
 
 #include "output/atomic_file.h"
 #include "output/text_file.h"
+#include "output/unit_length.h"
 
 namespace rotslam {
 namespace {
@@ -21,8 +22,6 @@ namespace {
 // Of the rotation vector per that of the quaternion's vector part, see g2o.h.
 constexpr double kInformationFactor = 4.0;
 constexpr std::string_view kBlanks = " \t\r,";
-// Matrices and quaternions in files are rounded.
-constexpr double kMaxNormError = 1e-2;
 
 // The words of one line, taken one by one.
 class Line {
@@ -85,7 +84,7 @@ Eigen::Vector3d TakeVector(Line& line) {
 Rotation TakeQuaternion(Line& line) {
   const Eigen::Vector3d v = TakeVector(line);
   const Eigen::Quaterniond q(line.Number(), v.x(), v.y(), v.z());
-  if (std::abs(q.norm() - 1.0) > kMaxNormError) line.Fail("the quaternion is not of unit length");
+  if (!IsUnitLength(q.norm())) line.Fail("the quaternion is not of unit length");
   return Rotation(q);
 }
 
@@ -139,13 +138,13 @@ ReadEdge TakePlainEdge(Line& line, double sigma_rad) {
   while (!line.AtEnd() && count < numbers.size()) numbers[count++] = line.Number();
   if (count == 4) {
     const Eigen::Quaterniond q(numbers[3], numbers[0], numbers[1], numbers[2]);
-    if (std::abs(q.norm() - 1.0) > kMaxNormError) line.Fail("the quaternion is not of unit length");
+    if (!IsUnitLength(q.norm())) line.Fail("the quaternion is not of unit length");
     edge.j_from_i = Rotation(q);
   } else if (count == 9) {
     const Eigen::Matrix3d R =
         Eigen::Map<const Eigen::Matrix<double, 3, 3, Eigen::RowMajor>>(numbers.data());
     if (R.determinant() < 0.0 ||
-        (R * R.transpose() - Eigen::Matrix3d::Identity()).norm() > kMaxNormError) {
+        (R * R.transpose() - Eigen::Matrix3d::Identity()).norm() > kMaxLengthError) {
       line.Fail("the nine numbers are no rotation matrix");
     }
     edge.j_from_i = Rotation(Eigen::Quaterniond(R));

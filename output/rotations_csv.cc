@@ -7,11 +7,11 @@
 
 #include "output/atomic_file.h"
 #include "output/text_file.h"
+#include "output/unit_length.h"
 
 namespace rotslam {
 namespace {
 
-constexpr double kMaxNormError = 1e-2;
 constexpr std::size_t kNumColumns = 11;
 
 void Require(const RotationRow& row) {
@@ -41,7 +41,7 @@ RotationRow ParseRow(const std::filesystem::path& path, const TextRow& text) {
   row.frame = IntegerAt(path, text, 0, 0);
   row.timestamp_s = number(1);
   const Eigen::Quaterniond q(number(5), number(2), number(3), number(4));
-  if (!(std::abs(q.norm() - 1.0) < kMaxNormError)) {
+  if (!IsUnitLength(q.norm())) {
     throw std::runtime_error(AtLine(path, text.line, "the quaternion is not of length 1"));
   }
   row.world_from_cam = Rotation(q);

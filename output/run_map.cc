@@ -14,7 +14,7 @@ namespace rotslam {
 namespace {
 
 constexpr std::string_view kMagic = "rotslam_map 1\n";
-constexpr double kMaxNormError = 1e-6;
+constexpr double kMaxOwnNormError = 1e-6;
 
 void PutRotation(BinaryWriter& writer, const Rotation& rotation) {
   for (const double value : rotation.Quaternion().coeffs()) writer.Put(value);
@@ -24,7 +24,7 @@ Rotation GetRotation(BinaryReader& reader) {
   Eigen::Vector4d coefficients;
   for (double& value : coefficients) value = reader.Get<double>();
   const Eigen::Quaterniond q(coefficients);
-  if (!(std::abs(q.norm() - 1.0) < kMaxNormError)) {
+  if (!(std::abs(q.norm() - 1.0) < kMaxOwnNormError)) {
     reader.Fail("a quaternion is not of length 1");
   }
   return Rotation(q);

@@ -53,8 +53,6 @@ std::string Cell(const std::string& value) {
 }
 
 std::string HtmlRow(const BatchResult& result) {
-  const std::optional<double> percent =
-      result.coverage ? std::optional(100.0 * *result.coverage) : std::nullopt;
   std::string row =
       "<tr class=\"" + std::string(result.status == "done" ? "done" : "other") + "\">";
   const std::string name = HtmlText(result.name);
@@ -62,7 +60,8 @@ std::string HtmlRow(const BatchResult& result) {
          (result.report.empty() ? name
                                 : "<a href=\"" + HtmlText(result.report) + "\">" + name + "</a>") +
          "</th>";
-  row += Cell(Shown(result.frames)) + Cell(Shown(percent, "%.1f"));
+  row += Cell(Shown(result.frames)) +
+         Cell(result.coverage ? FormatNumber("%.1f", 100.0 * *result.coverage) : "");
   row += Cell(Shown(result.rpe1_deg, "%.4f")) + Cell(Shown(result.rpen_deg, "%.4f"));
   row += Cell(Shown(result.ate, "%.4f")) + Cell(Shown(result.points));
   row += Cell(Shown(result.cpu_s, "%.1f"));

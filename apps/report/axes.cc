@@ -9,7 +9,6 @@
 namespace rotslam {
 namespace {
 
-constexpr Color kInk = {0.1, 0.1, 0.1};
 constexpr Color kGrid = {0.87, 0.87, 0.87};
 
 struct Ticks {

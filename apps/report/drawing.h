@@ -16,6 +16,8 @@ struct Color {
   double opacity = 1.0;
 };
 
+inline constexpr Color kInk = {0.1, 0.1, 0.1};
+
 struct Stroke {
   Color color;
   double width = 1.0;

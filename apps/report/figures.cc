@@ -14,7 +14,6 @@
 namespace rotslam {
 namespace {
 
-constexpr Color kInk = {0.1, 0.1, 0.1};
 constexpr Color kBlue = {0.10, 0.36, 0.72};
 constexpr Color kOrange = {0.85, 0.41, 0.05};
 constexpr Color kGreen = {0.05, 0.48, 0.32};

@@ -13,7 +13,7 @@ namespace {
 
 constexpr int kMaxNewtonSteps = 100;
 constexpr double kSmallestTurn_rad = 1e-12;
-constexpr double kDamping = 1e-12;
+constexpr double kLeastDamping = 1e-12;
 // Relative to the largest diagonal: what rounding hides, and where the search for epsilon ends.
 constexpr double kFirstShift = 1e-12;
 constexpr double kLastShift = 10.0;
@@ -116,7 +116,7 @@ void Refine(Chords& chords) {
   double cost = Cost(chords);
   for (int step = 0; step < kMaxNewtonSteps; ++step) {
     Eigen::VectorXd turns = Descent(chords);
-    if (!solver.Solve(laplacian, kDamping, turns)) return;
+    if (!solver.Solve(laplacian, kLeastDamping, turns)) return;
     // A common turn of all views changes nothing.
     const std::vector<Eigen::Matrix3d> before = chords.R_c_w;
     bool goes_down = false;

@@ -13,7 +13,6 @@ namespace rotslam {
 namespace {
 
 constexpr int kDescriptorBytes = 32;
-constexpr float kRadPerDeg = 0.017453292519943295F;
 
 // A copy of the pixels around a place, the image continued by its mirror image.
 template <int kBefore, int kSize>
@@ -157,7 +156,7 @@ void DescribeFeatures(const ImagePyramid& pyramid, int num_threads, Features& fe
     for (std::size_t index = 0; index < centers.size(); ++index) {
       const int k = of_level[level][index];
       const float angle_deg = AngleDegAt(image, centers[index]);
-      features.angles_rad[k] = angle_deg * kRadPerDeg;
+      features.angles_rad[k] = angle_deg * kOrbRadPerDeg;
       DescribeAt(
           blurred, image.size(), centers[index], angle_deg, descriptors.ptr<std::uint8_t>(k));
     }

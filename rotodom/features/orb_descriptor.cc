@@ -16,7 +16,6 @@ namespace rotslam {
 namespace {
 
 constexpr int kPairs = 256;
-constexpr float kRadPerDeg = 0.017453292519943295F;
 
 // The disc's rows as weights of the 32 pixels that start kOrbHalfPatch left of the centre: 1
 // inside, 0 outside. Symmetric about the diagonal, as in ORB.
@@ -256,7 +255,7 @@ float CentroidAngleDeg(const std::uint8_t* center, std::ptrdiff_t step) {
   } else {
     DiscMomentsPlain(center, step, mask, m_x, m_y);
   }
-  return std::atan2(static_cast<float>(m_y), static_cast<float>(m_x)) / kRadPerDeg;
+  return std::atan2(static_cast<float>(m_y), static_cast<float>(m_x)) / kOrbRadPerDeg;
 }
 
 void ComputeOrbDescriptor(const std::uint8_t* blurred_center,
@@ -264,7 +263,7 @@ void ComputeOrbDescriptor(const std::uint8_t* blurred_center,
                           float angle_deg,
                           std::uint8_t* descriptor) {
   static const PatternLists pattern = MakePatternLists();
-  const float angle_rad = angle_deg * kRadPerDeg;
+  const float angle_rad = angle_deg * kOrbRadPerDeg;
   const float cosine = std::cos(angle_rad);
   const float sine = std::sin(angle_rad);
   std::array<int, 2 * kPairs> offsets;

@@ -8,6 +8,8 @@ namespace rotslam {
 // Half the side of the patch that ORB looks at.
 inline constexpr int kOrbHalfPatch = 15;
 
+inline constexpr float kOrbRadPerDeg = 0.017453292519943295F;
+
 // Farthest pixel, in a row or a column, that a turned pair of points can touch.
 inline constexpr int kOrbReach = 19;
 

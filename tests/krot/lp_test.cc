@@ -18,7 +18,7 @@ LinearProgram SmallProgram() {
 }
 
 // Every engine of this build with every method.
-std::vector<LpOptions> AllWays() {
+std::vector<LpOptions> AllEngines() {
   std::vector<LpOptions> ways;
   for (const LpEngine engine : {LpEngine::kClp, LpEngine::kGlpk}) {
     if (!HasLpEngine(engine)) continue;
@@ -33,7 +33,7 @@ std::vector<LpOptions> AllWays() {
 }
 
 TEST(SolveLp, FindsOptimumAndPricesByAllEnginesAndMethods) {
-  for (const LpOptions& options : AllWays()) {
+  for (const LpOptions& options : AllEngines()) {
     const LpResult result = SolveLp(SmallProgram(), options);
     ASSERT_EQ(result.call, LpCallStatus::kCompleted);
     EXPECT_EQ(result.model, LpModelStatus::kOptimal);
@@ -46,7 +46,7 @@ TEST(SolveLp, FindsOptimumAndPricesByAllEnginesAndMethods) {
 }
 
 TEST(SolveLp, RepeatsItsDigits) {
-  for (const LpOptions& options : AllWays()) {
+  for (const LpOptions& options : AllEngines()) {
     const LpResult a = SolveLp(SmallProgram(), options);
     const LpResult b = SolveLp(SmallProgram(), options);
     EXPECT_EQ(a.primal, b.primal);
@@ -58,7 +58,7 @@ TEST(SolveLp, InfeasibleIsAModelStatusNotAFailedCall) {
   LinearProgram program = SmallProgram();
   program.AddRow(10.0, kInfinity);
   program.AddColumn(0.0, 0.0, 1.0, std::vector<std::pair<int, double>>{{2, 1.0}});
-  for (const LpOptions& options : AllWays()) {
+  for (const LpOptions& options : AllEngines()) {
     if (options.method != LpMethod::kDualSimplex) continue;
     const LpResult result = SolveLp(program, options);
     EXPECT_EQ(result.call, LpCallStatus::kCompleted);

@@ -16,7 +16,7 @@
 namespace rotslam {
 namespace {
 
-using nlohmann::json;
+using Json = nlohmann::json;
 
 std::map<FrameId, KeypointDescriptors> SomeDescriptors(const RunMap& map) {
   std::map<FrameId, KeypointDescriptors> descriptors;
@@ -34,16 +34,16 @@ std::map<FrameId, KeypointDescriptors> SomeDescriptors(const RunMap& map) {
   return descriptors;
 }
 
-json Written(const RunMap& map) {
+Json Written(const RunMap& map) {
   const TemporaryFolder folder;
   WriteStellaMap(folder.path() / "map.msg", map, SomeDescriptors(map));
   const std::string bytes = ReadWholeFile(folder.path() / "map.msg");
-  return json::from_msgpack(bytes.begin(), bytes.end());
+  return Json::from_msgpack(bytes.begin(), bytes.end());
 }
 
 TEST(StellaMap, ReadsBackTheSame) {
   const RunMap map = MapOfScene(ExportScene());
-  const json stella = Written(map);
+  const Json stella = Written(map);
   const auto descriptors = SomeDescriptors(map);
   const auto keypoints = ListKeypoints(map);
   EXPECT_EQ(stella["cameras"]["rotslam"]["model_type"], "Perspective");
@@ -55,7 +55,7 @@ TEST(StellaMap, ReadsBackTheSame) {
   EXPECT_EQ(stella["keyframe_next_id"], map.frames.size());
   for (std::size_t k = 0; k < map.frames.size(); ++k) {
     const MapFrame& frame = map.frames[k];
-    const json& keyframe = stella["keyframes"][std::to_string(k)];
+    const Json& keyframe = stella["keyframes"][std::to_string(k)];
     EXPECT_EQ(keyframe["ts"], frame.timestamp_s);
     EXPECT_TRUE(stella["cameras"].contains(keyframe["cam"].get<std::string>()));
     EXPECT_TRUE(stella["orb_params"].contains(keyframe["orb_params"].get<std::string>()));
@@ -74,7 +74,7 @@ TEST(StellaMap, ReadsBackTheSame) {
     for (std::size_t p = 0; p < list.size(); ++p) {
       const MapTrack& entry = map.tracks[list[p].track];
       const Observation& seen = entry.track.observations[list[p].observation];
-      const json& corner = keyframe["undist_keypts"][p];
+      const Json& corner = keyframe["undist_keypts"][p];
       EXPECT_NEAR(corner["pt"][0].get<double>(), seen.keypoint_px.x(), 1e-4);
       EXPECT_NEAR(corner["pt"][1].get<double>(), seen.keypoint_px.y(), 1e-4);
       EXPECT_EQ(corner["oct"], entry.levels[list[p].observation]);
@@ -90,8 +90,8 @@ TEST(StellaMap, ReadsBackTheSame) {
 // What the program checks while it reads, and where it would stop.
 TEST(StellaMap, HangsTogether) {
   const RunMap map = KeyframesOnly(MapOfScene(ExportScene()));
-  const json stella = Written(map);
-  const json& keyframes = stella["keyframes"];
+  const Json stella = Written(map);
+  const Json& keyframes = stella["keyframes"];
   std::map<int, std::set<int>> shown_by;
   for (const auto& [id, keyframe] : keyframes.items()) {
     std::set<int> ids;
@@ -130,13 +130,13 @@ TEST(StellaMap, UndistortsFisheyesAndLeavesOutWhatLiesBehind) {
   map.camera.model = CameraModel::kEquidistant;
   map.tracks[0].track.observations[0].bearing = Eigen::Vector3d(0.6, 0.0, -0.8);
   map.tracks[1].track.observations[0].bearing = Eigen::Vector3d(0.6, 0.0, 0.8);
-  const json stella = Written(map);
+  const Json stella = Written(map);
   EXPECT_EQ(stella["cameras"]["rotslam"]["model_type"], "Fisheye");
   EXPECT_TRUE(stella["cameras"]["rotslam"].contains("k4"));
   const FrameId frame = map.tracks[0].track.observations[0].frame;
   ASSERT_EQ(frame, map.frames[0].id);
   ASSERT_EQ(map.tracks[1].track.observations[0].frame, frame);
-  const json& keyframe = stella["keyframes"]["0"];
+  const Json& keyframe = stella["keyframes"]["0"];
   EXPECT_EQ(keyframe["n_keypts"].get<std::size_t>() + 1, ListKeypoints(map).at(frame).size());
   EXPECT_NEAR(keyframe["undist_keypts"][0]["pt"][0].get<double>(),
               map.camera.cx + 0.75 * map.camera.fx,

@@ -9,12 +9,6 @@
 namespace rotslam {
 namespace {
 
-Eigen::Vector3d NormalVector(SceneRandom& random, double sigma) {
-  const double x = random.Normal(sigma);
-  const double y = random.Normal(sigma);
-  return {x, y, random.Normal(sigma)};
-}
-
 std::vector<int> PartnersOf(int view, const RotationGraphOptions& options) {
   std::vector<int> partners;
   const int oldest = std::max(0, view - options.reach);
@@ -42,7 +36,7 @@ RotationGraph MakeRotationGraph(const RotationGraphOptions& options) {
       scene.chained_cam_from_world[view_j] = Rotation();
       continue;
     }
-    const Eigen::Vector3d turn = NormalVector(random, options.step_deg * kRadFromDeg);
+    const Eigen::Vector3d turn = random.NormalVector(options.step_deg * kRadFromDeg);
     scene.true_cam_from_world[view_j] =
         Rotation::Exp(turn) * scene.true_cam_from_world[FrameId{j - 1}];
     for (const int i : PartnersOf(j, options)) {
@@ -51,13 +45,13 @@ RotationGraph MakeRotationGraph(const RotationGraphOptions& options) {
       edge.i = view_i;
       edge.j = view_j;
       const double sigma = options.noise_deg * kRadFromDeg;
-      edge.j_from_i = Rotation::Exp(NormalVector(random, sigma)) *
+      edge.j_from_i = Rotation::Exp(random.NormalVector(sigma)) *
                       scene.true_cam_from_world[view_j] *
                       scene.true_cam_from_world[view_i].Inverse();
       edge.covariance = (sigma * sigma + 1e-12) * Eigen::Matrix3d::Identity();
       edge.num_inliers = 500;
       const bool wrong = random.Uniform(0.0, 1.0) < options.wrong_ratio;
-      const Eigen::Vector3d axis = NormalVector(random, 1.0).normalized();
+      const Eigen::Vector3d axis = random.NormalVector(1.0).normalized();
       const double angle = std::pow(60.0, random.Uniform(0.0, 1.0)) * kRadFromDeg;
       if (wrong && (options.wrong_steps || i != j - 1)) {
         edge.j_from_i = Rotation::Exp(angle * axis) * edge.j_from_i;

@@ -206,6 +206,12 @@ double SceneRandom::Normal(double sigma) {  // Box-Muller
   return sigma * radius * std::cos(2.0 * std::numbers::pi * Uniform(0.0, 1.0));
 }
 
+Eigen::Vector3d SceneRandom::NormalVector(double sigma) {
+  const double x = Normal(sigma);
+  const double y = Normal(sigma);
+  return {x, y, Normal(sigma)};
+}
+
 int SceneRandom::Index(int count) {
   return static_cast<int>(Next() % static_cast<std::uint64_t>(count));
 }

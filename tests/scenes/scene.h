@@ -62,6 +62,7 @@ class SceneRandom {
   explicit SceneRandom(std::uint64_t seed) : state_(seed * 0x9E3779B97F4A7C15ull + 1) {}
   double Uniform(double low, double high);
   double Normal(double sigma);
+  Eigen::Vector3d NormalVector(double sigma);
   int Index(int count);  // in [0, count)
 
  private:

@@ -16,14 +16,8 @@ constexpr int kStreetReach = 9;
 constexpr int kCrossingEvery = 25;
 constexpr int kCrossingReach = 3;
 
-Eigen::Vector3d NormalVector(SceneRandom& random, double sigma) {
-  const double x = random.Normal(sigma);
-  const double y = random.Normal(sigma);
-  return {x, y, random.Normal(sigma)};
-}
-
 Rotation RandomRotation(SceneRandom& random) {
-  const Eigen::Vector3d v = NormalVector(random, 1.0);
+  const Eigen::Vector3d v = random.NormalVector(1.0);
   return Rotation(Eigen::Quaterniond(random.Normal(1.0), v.x(), v.y(), v.z()));
 }
 
@@ -31,11 +25,11 @@ int RandomView(SceneRandom& random, int num_views) {
   return std::min(num_views - 1, static_cast<int>(random.Uniform(0.0, 1.0) * num_views));
 }
 
-using Pairs = std::vector<std::pair<int, int>>;
+using NumberPairs = std::vector<std::pair<int, int>>;
 
-Pairs RandomPairs(int num_views, double edges_per_view, SceneRandom& random) {
+NumberPairs RandomPairs(int num_views, double edges_per_view, SceneRandom& random) {
   const int num_edges = static_cast<int>(0.5 * edges_per_view * num_views);
-  Pairs pairs;
+  NumberPairs pairs;
   pairs.reserve(num_edges);
   // A ring joins all.
   for (int k = 0; k < num_views; ++k) pairs.emplace_back(k, (k + 1) % num_views);
@@ -47,8 +41,8 @@ Pairs RandomPairs(int num_views, double edges_per_view, SceneRandom& random) {
   return pairs;
 }
 
-Pairs GridPairs(int side) {
-  Pairs pairs;
+NumberPairs GridPairs(int side) {
+  NumberPairs pairs;
   for (int row = 0; row < side; ++row) {
     for (int column = 0; column < side; ++column) {
       const int view = row * side + column;
@@ -59,8 +53,8 @@ Pairs GridPairs(int side) {
   return pairs;
 }
 
-Pairs ChainPairs(int num_views, SceneRandom& random) {
-  Pairs pairs;
+NumberPairs ChainPairs(int num_views, SceneRandom& random) {
+  NumberPairs pairs;
   for (int j = 1; j < num_views; ++j) {
     for (int i = std::max(0, j - kChainReach); i < j; ++i) pairs.emplace_back(i, j);
   }
@@ -74,9 +68,9 @@ Pairs ChainPairs(int num_views, SceneRandom& random) {
 
 // `side` streets from west to east and as many from north to south, which cross at every
 // kCrossingEvery-th view. The views of a street follow each other.
-Pairs CityPairs(int side) {
+NumberPairs CityPairs(int side) {
   const int length = side * kCrossingEvery;
-  Pairs pairs;
+  NumberPairs pairs;
   for (int street = 0; street < 2 * side; ++street) {
     for (int k = 0; k < length; ++k) {
       for (int step = 1; step <= kStreetReach && k + step < length; ++step) {
@@ -117,7 +111,7 @@ std::string NameOf(GraphShape shape) {
 WrongEdges MakeWrongEdges(const WrongEdgesOptions& options) {
   SceneRandom random(options.seed);
   int num_views = options.num_views;
-  Pairs pairs;
+  NumberPairs pairs;
   if (options.shape == GraphShape::kRandom) {
     pairs = RandomPairs(num_views, options.edges_per_view, random);
   } else if (options.shape == GraphShape::kGrid) {
@@ -152,9 +146,9 @@ WrongEdges MakeWrongEdges(const WrongEdgesOptions& options) {
     edge.i = FrameId{i};
     edge.j = FrameId{j};
     edge.covariance = (sigma * sigma + 1e-12) * Eigen::Matrix3d::Identity();
-    edge.j_from_i =
-        is_wrong ? RandomRotation(random)
-                 : Rotation::Exp(NormalVector(random, sigma)) * truth[j] * truth[i].Inverse();
+    edge.j_from_i = is_wrong
+                        ? RandomRotation(random)
+                        : Rotation::Exp(random.NormalVector(sigma)) * truth[j] * truth[i].Inverse();
     scene.is_wrong.push_back(is_wrong ? 1 : 0);
   }
   return scene;

@@ -27,9 +27,9 @@ BagOfWords RandomBag(int num_words, int num_features, std::mt19937_64& random) {
   return bag;
 }
 
-using Frames = std::map<FrameId, BagOfWords>;
+using BagOf = std::map<FrameId, BagOfWords>;
 
-std::vector<PlaceMatch> BruteForce(const Frames& frames, const BagOfWords& bag) {
+std::vector<PlaceMatch> BruteForce(const BagOf& frames, const BagOfWords& bag) {
   std::vector<PlaceMatch> matches;
   for (const auto& [frame, other] : frames) {
     int common_words = 0;
@@ -44,13 +44,13 @@ std::vector<PlaceMatch> BruteForce(const Frames& frames, const BagOfWords& bag) 
 
 TEST(PlaceDatabase, AgreesWithBruteForceAsFramesComeAndGo) {
   std::mt19937_64 random(1);
-  constexpr int kNumWords = 3000;
-  PlaceDatabase database(kNumWords);
-  Frames frames;
+  constexpr int kVocabularySize = 3000;
+  PlaceDatabase database(kVocabularySize);
+  BagOf frames;
   for (int step = 0; step < 600; ++step) {
     const FrameId frame{static_cast<int>(random() % 5000)};
     if (!frames.contains(frame)) {
-      frames[frame] = RandomBag(kNumWords, static_cast<int>(random() % 60), random);
+      frames[frame] = RandomBag(kVocabularySize, static_cast<int>(random() % 60), random);
       database.Add(frame, frames[frame]);
     }
     // From step 300 on more frames go than come.
@@ -61,7 +61,7 @@ TEST(PlaceDatabase, AgreesWithBruteForceAsFramesComeAndGo) {
     }
     ASSERT_EQ(database.size(), static_cast<int>(frames.size()));
     if (step % 20 != 0) continue;
-    const BagOfWords bag = RandomBag(kNumWords, 60, random);
+    const BagOfWords bag = RandomBag(kVocabularySize, 60, random);
     const std::vector<PlaceMatch> expected = BruteForce(frames, bag);
     const std::vector<PlaceMatch> matches = database.Query(bag);
     ASSERT_EQ(matches.size(), expected.size()) << "step " << step;
