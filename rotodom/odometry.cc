@@ -193,16 +193,20 @@ TrackingResult RotationalOdometry::Track(const std::vector<OrientedView>& views,
                                        seed_,
                                        num_threads_});
   estimate.report.searched_wide = true;
+  // Patches that look alike can be found in the wrong places all together; descriptors, sought
+  // everywhere, are another witness, better by the places to which their matches were moved.
+  std::optional<Rotation> witness;
+  if (recovery) {
+    const Agreement moved = AgreementOf({recovery->cam_from_world, recovery->points, 0}, views);
+    witness = moved.num_points > 0 ? moved.cam_from_world : recovery->cam_from_world;
+  }
   TrackingResult best;
   best.cam_from_world = target.cam_from_world;
   int most_agreeing = 0;
   const auto consider = [&](TrackingResult&& candidate) {
     const Agreement agreement = AgreementOf(candidate, views);
     if (agreement.num_points <= most_agreeing) return;
-    // Patches that look alike can be found in the wrong places all together; descriptors, sought
-    // everywhere, are another witness.
-    const Rotation doubt =
-        recovery ? agreement.cam_from_world * recovery->cam_from_world.Inverse() : Rotation();
+    const Rotation doubt = witness ? agreement.cam_from_world * witness->Inverse() : Rotation();
     if (doubt.AngleDeg() > kSameRotationDeg) return;
     most_agreeing = agreement.num_points;
     best = std::move(candidate);

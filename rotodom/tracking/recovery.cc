@@ -93,7 +93,7 @@ std::optional<Witness> RecoverFrom(std::span<const OrientedView> views,
 // far apart overlap only with the one before.
 std::optional<Recovery> MostPointsConfirmed(std::vector<Witness>& witnesses) {
   // Views a few frames apart see much the same; where they differ by more, so may the truth.
-  constexpr double kSameRotationDeg = 1.0;
+  constexpr double kSameRotationDeg = 3.0;
   std::erase_if(witnesses, [](const Witness& witness) { return !witness.is_clear; });
   const auto is_confirmed = [&](const Witness& witness) {
     return witnesses.size() == 1 ||
