@@ -12,7 +12,6 @@
 namespace rotslam {
 namespace {
 
-constexpr std::size_t kNumColumns = 11;
 
 void Require(const RotationRow& row) {
   const auto refuse = [&](const std::string& what) {
@@ -74,6 +73,7 @@ void WriteRotationsCsv(const std::filesystem::path& path, const std::vector<Rota
 }
 
 std::vector<RotationRow> ReadRotationsCsv(const std::filesystem::path& path) {
+  constexpr std::size_t kNumColumns = 11;
   const std::vector<TextRow> texts = ReadCsvRows(path, kNumColumns);
   std::vector<RotationRow> rows;
   rows.reserve(texts.size());
