@@ -8,6 +8,7 @@
 #include <Eigen/Dense>
 
 #include "krot/half_spaces.h"
+#include "krot/interior_start.h"
 #include "krot/lp.h"
 #include "krot/recentring.h"
 #include "rotodom/types/median.h"
@@ -83,31 +84,8 @@ Iterate Start(const Program& program, const Eigen::VectorXd& x, double margin) {
   at.x = x;
   const double mean = program.mean_row().dot(x);
   if (mean > 0.0) at.x /= mean;
-  at.y.resize(program.size());
-  at.r.resize(program.size());
-  UpdateRows(program, at);
-  double least = 0.0;
-  for (int o = 0; o < program.size(); ++o) {
-    const Five sigma = program.Sigma(o);
-    for (int k = 0; k < 5; ++k) {
-      if (sigma[k] > 0.0) least = std::min(least, at.r[o][k] / sigma[k]);
-    }
-  }
-  at.s = margin - least;
-  UpdateRows(program, at);
-  double sum = 0.0;
-  for (int o = 0; o < program.size(); ++o) {
-    at.r[o] = at.r[o].max(1e-12 * margin);
-    sum += (program.Sigma(o) / at.r[o]).sum();
-  }
-  for (int o = 0; o < program.size(); ++o) at.y[o] = 1.0 / (sum * at.r[o]);
+  StartRows(program, margin, UpdateRows, at);
   return at;
-}
-
-double Complementarity(const Iterate& at) {
-  double sum = 0.0;
-  for (std::size_t o = 0; o < at.y.size(); ++o) sum += (at.y[o] * at.r[o]).sum();
-  return sum;
 }
 
 // Newton steps from one iterate: the factor serves predictor and corrector.

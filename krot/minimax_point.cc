@@ -6,6 +6,8 @@
 
 #include <Eigen/Dense>
 
+#include "krot/interior_start.h"
+
 namespace rotslam {
 namespace {
 
@@ -90,31 +92,8 @@ void UpdateRows(const PointProgram& program, PointIterate& at) {
 PointIterate Start(const PointProgram& program, const Eigen::Vector3d& u, double margin) {
   PointIterate at;
   at.u = u;
-  at.y.resize(program.size());
-  at.r.resize(program.size());
-  UpdateRows(program, at);
-  double least = 0.0;
-  for (int o = 0; o < program.size(); ++o) {
-    const Six sigma = program.Sigma(o);
-    for (int k = 0; k < 6; ++k) {
-      if (sigma[k] > 0.0) least = std::min(least, at.r[o][k] / sigma[k]);
-    }
-  }
-  at.s = margin - least;
-  UpdateRows(program, at);
-  double sum = 0.0;
-  for (int o = 0; o < program.size(); ++o) {
-    at.r[o] = at.r[o].max(1e-12 * margin);
-    sum += (program.Sigma(o) / at.r[o]).sum();
-  }
-  for (int o = 0; o < program.size(); ++o) at.y[o] = 1.0 / (sum * at.r[o]);
+  StartRows(program, margin, UpdateRows, at);
   return at;
-}
-
-double Complementarity(const PointIterate& at) {
-  double sum = 0.0;
-  for (std::size_t o = 0; o < at.y.size(); ++o) sum += (at.y[o] * at.r[o]).sum();
-  return sum;
 }
 
 double Ratio(const Sixes& value, const Sixes& step) {
