@@ -46,7 +46,8 @@ std::vector<Variant> Variants() {
           {"yaw 120 slow", {"--frames=300"}},
           {"yaw 120 fast", {"--frames=60"}},
           {"yaw 120 noise 6", {"--noise=6"}},
-          {"yaw 120 blur", {"--blur=6", "--shutter=0.02"}},
+          {"yaw 120 blur 4", {"--blur=4", "--shutter=0.005"}},
+          {"yaw 120 blur 17", {"--blur=6", "--shutter=0.02"}},
           {"yaw 120 boxes", {"--distractors=4"}},
           {"yaw 120 1 cm", {"--lever-arm=0.01"}},
           {"yaw 120 5 cm", {"--lever-arm=0.05"}}};
