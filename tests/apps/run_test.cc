@@ -280,9 +280,15 @@ TEST_F(RunCommand, GimbalStandsWhileItOnlyRotates) {
   std::erase_if(turns, moves);
   ASSERT_EQ(true_turns.size(), 1u);
   ASSERT_EQ(turns.size(), 1u);
-  // The first and last step of the turn barely tell whether the camera still moves.
-  EXPECT_NEAR(turns[0].first, true_turns[0].first, 2);
-  EXPECT_NEAR(turns[0].last, true_turns[0].last, 2);
+  EXPECT_LE(turns[0].first, true_turns[0].first);
+  EXPECT_GE(turns[0].last, true_turns[0].last);
+  // A camera that brakes and starts softly creeps: 0.3 mm show as 0.03 px at the walls, little more
+  // than matches may err by in common. 18 to 41 are right and found.
+  for (int frame = turns[0].first; frame <= turns[0].last; ++frame) {
+    const Eigen::Vector3d off =
+        truth[frame].center_in_world - truth[true_turns[0].first].center_in_world;
+    EXPECT_LT(off.norm(), 3e-4) << frame;
+  }
 
   std::vector<std::string> lines = Lines(ReadWholeFile(Out("gimbal") / "trajectory_tum.txt"));
   // Said in front of the poses: nothing ties the scale behind the turn.
