@@ -89,26 +89,14 @@ std::optional<Witness> RecoverFrom(std::span<const OrientedView> views,
   return Witness{std::move(recovery), static_cast<double>(estimate->inliers.size()) > least};
 }
 
-// The clear one with the most points that another clear one confirms; alone, it is believed: stills
-// far apart overlap only with the one before.
-std::optional<Recovery> MostPointsConfirmed(std::vector<Witness>& witnesses) {
-  // Views a few frames apart see much the same; where they differ by more, so may the truth.
-  constexpr double kSameRotationDeg = 3.0;
+// The clear one with the most points.
+std::optional<Recovery> Clearest(std::vector<Witness>& witnesses) {
   std::erase_if(witnesses, [](const Witness& witness) { return !witness.is_clear; });
-  const auto is_confirmed = [&](const Witness& witness) {
-    return witnesses.size() == 1 ||
-           std::any_of(witnesses.begin(), witnesses.end(), [&](const Witness& other) {
-             const Rotation doubt =
-                 other.recovery.cam_from_world * witness.recovery.cam_from_world.Inverse();
-             return &other != &witness && doubt.AngleDeg() <= kSameRotationDeg;
-           });
-  };
-  Witness* best = nullptr;
-  for (Witness& witness : witnesses) {
-    if (best != nullptr && witness.num_points() <= best->num_points()) continue;
-    if (is_confirmed(witness)) best = &witness;
-  }
-  if (best == nullptr) return std::nullopt;
+  const auto best =
+      std::max_element(witnesses.begin(), witnesses.end(), [](const Witness& a, const Witness& b) {
+        return a.num_points() < b.num_points();
+      });
+  if (best == witnesses.end()) return std::nullopt;
   return std::move(best->recovery);
 }
 
@@ -129,7 +117,7 @@ std::optional<Recovery> RecoverMotion(std::span<const OrientedView> views,
     // Few points may agree by chance: then the older views are asked as well.
     witnesses.push_back(*std::move(witness));
   }
-  return MostPointsConfirmed(witnesses);
+  return Clearest(witnesses);
 }
 
 }  // namespace rotslam

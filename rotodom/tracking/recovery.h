@@ -34,8 +34,8 @@ struct RecoveryOptions {
 /// Matches the target's ORB features against those of `views`, one view after the other, until
 /// tracking.min_points matches agree on a relative rotation, and takes the view with the most: the
 /// way back when tracking has failed. Where fewer agree they must be min_inlier_ratio of those that
-/// look alike, and another view of which that holds, if there is one, must say the same: after a
-/// gap of seconds, four in ten of a hundred matches agreed on rotations that were 7 to 10 deg off.
+/// look alike: after a gap of seconds, four in ten of a hundred matches agreed on rotations that
+/// were 7 to 10 deg off.
 /// @param views  newest first.
 /// @return  nullopt when no view matches.
 std::optional<Recovery> RecoverMotion(std::span<const OrientedView> views,
