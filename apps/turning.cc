@@ -12,6 +12,13 @@ constexpr double kMinShare = 0.25;
 // A sample may explain this much less than is asked for: it has fewer observations to find the
 // lens with.
 constexpr double kSampleShare = 0.8;
+// No calibration, guessed or not, is wrong by more than this factor.
+constexpr double kMaxFocalFactor = 2.0;
+
+bool IsLensCredible(const Camera& given, const Camera& refined) {
+  const double factor = refined.MeanFocal() / given.MeanFocal();
+  return factor <= kMaxFocalFactor && factor >= 1.0 / kMaxFocalFactor;
+}
 
 std::vector<Track> SampleOf(const std::vector<Track>& tracks) {
   const std::size_t stride = (tracks.size() + kSampledTracks - 1) / kSampledTracks;
@@ -52,12 +59,14 @@ std::optional<TurningResult> FindTurning(const Camera& camera,
   if (sample.size() < tracks.size()) {
     const TurningResult sampled = RefineTurning(camera, cam_from_world, sample, options);
     const double share = static_cast<double>(NumObservations(sample)) / num_given;
-    if (!sampled.Usable() || Redundancy(sampled) < kSampleShare * share * needed) {
+    if (!sampled.Usable() || !IsLensCredible(camera, sampled.camera) ||
+        Redundancy(sampled) < kSampleShare * share * needed) {
       return std::nullopt;
     }
   }
   TurningResult turning = RefineTurning(camera, cam_from_world, tracks, options);
-  if (!turning.Usable() || !turning.lens_refined || Redundancy(turning) <= needed) {
+  if (!turning.Usable() || !turning.lens_refined || !IsLensCredible(camera, turning.camera) ||
+      Redundancy(turning) <= needed) {
     return std::nullopt;
   }
   return turning;

@@ -12,7 +12,6 @@
 namespace rotslam {
 namespace {
 
-
 void Require(const RotationRow& row) {
   const auto refuse = [&](const std::string& what) {
     throw std::invalid_argument("WriteRotationsCsv: frame " + std::to_string(row.frame) + ": " +

@@ -34,6 +34,29 @@ TEST(FindTurning, BelievesInATurnThatAnotherLensExplains) {
   }
 }
 
+// Rotations with a lens many times as long fit as well, and are fewer numbers.
+TEST(FindTurning, NeverBelievesThatAWallThatPassesIsATurn) {
+  const BaScene scene = MakeScene(true);
+  RotationMap cam_from_world;
+  std::vector<Track> tracks(600);
+  const Eigen::Vector2d centre_px(scene.camera.cx, scene.camera.cy);
+  for (int k = 0; k < 24; ++k) {
+    const FrameId frame{k};
+    cam_from_world[frame] = Rotation();
+    for (int n = 0; n < 600; ++n) {
+      const Eigen::Vector3d point(0.4 * (n % 30) - 4.0, 0.4 * (n / 30) - 4.0, 10.0);
+      const Eigen::Vector3d in_camera = point - Eigen::Vector3d(0.15 * k, 0.0, 0.0);
+      const auto keypoint = scene.camera.Project(in_camera);
+      if (!keypoint || (*keypoint - centre_px).cwiseAbs().maxCoeff() > centre_px.x()) continue;
+      tracks[n].id = TrackId{n};
+      tracks[n].observations.push_back({frame, *keypoint, in_camera.normalized()});
+    }
+  }
+  std::erase_if(tracks, [](const Track& track) { return track.observations.size() < 3; });
+  ASSERT_GT(tracks.size(), 200U);
+  EXPECT_FALSE(FindTurning(scene.camera, cam_from_world, tracks, 0, {}).has_value());
+}
+
 TEST(FindTurning, LeavesAGoodCalibrationToTheTestOfPairs) {
   const BaScene scene = MakeScene(true);
   EXPECT_FALSE(
