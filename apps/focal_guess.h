@@ -31,10 +31,11 @@ Camera CameraOf(const FocalGuess& guess, const cv::Size& image_size);
 void FreeFocal(LensOptions& lens);
 
 /// Improves the guess of an input that has not been read from: solves the beginning of the sequence
-/// for orientations and positions, with the focal length free. Orientations suffer from a wrong
-/// focal length (twice the right one loses KITTI 00 in its turn), positions tell it all the same:
-/// 720 px from 1489, where the calibration says 719. So do turns in place: 524.9 px from 768, where
-/// the truth is 525. Does nothing without a guess; leaves it where neither can be found.
+/// for orientations and positions, with the focal length free, until that changes it little.
+/// Orientations suffer from a wrong focal length (twice the right one loses KITTI 00 in its turn),
+/// positions tell it all the same: 717 px from 1489, where the calibration says 719. So do turns in
+/// place: 525.0 px from 768, where the truth is 525. Does nothing without a guess; leaves it where
+/// neither can be found.
 void RefineGuess(const InputFlags& flags,
                  const CommonFlags& common,
                  const PipelineOptions& options,

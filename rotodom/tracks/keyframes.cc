@@ -51,28 +51,13 @@ Overlap Compare(const std::vector<Ray>& keyframe, const std::vector<Ray>& frame)
   return {overlap, Median(std::move(angles))};
 }
 
-}  // namespace
-
-std::optional<std::string> KeyframeOptions::Problem() const {
-  if (!(min_parallax_deg > 0.0)) {
-    return OutOfRange("min_parallax_deg", min_parallax_deg, "positive");
-  }
-  if (!(min_shared_ratio >= 0.0 && min_shared_ratio < 1.0)) {
-    return OutOfRange("min_shared_ratio", min_shared_ratio, "0 or more and below 1");
-  }
-  if (every_frames < 0) return OutOfRange("every_frames", every_frames, "at least 0");
-  return std::nullopt;
-}
-
-std::set<FrameId> SelectKeyframes(const RotationMap& cam_from_world,
-                                  const std::vector<Track>& tracks,
-                                  const std::vector<HeldStretch>& held,
-                                  const KeyframeOptions& options) {
-  if (const auto problem = options.Problem())
-    throw std::invalid_argument("KeyframeOptions: " + *problem);
+// One pass over the frames.
+// @param rays_of  of every frame that sees something.
+std::set<FrameId> SelectFrom(const RotationMap& cam_from_world,
+                             const std::map<FrameId, std::vector<Ray>>& rays_of,
+                             const std::vector<HeldStretch>& held,
+                             const KeyframeOptions& options) {
   std::set<FrameId> keyframes;
-  if (cam_from_world.empty()) return keyframes;
-  const auto rays_of = RaysOfFrames(cam_from_world, tracks);
   static const std::vector<Ray> kNoRays;
   const auto rays = [&](FrameId frame) -> const std::vector<Ray>& {
     const auto entry = rays_of.find(frame);
@@ -113,6 +98,39 @@ std::set<FrameId> SelectKeyframes(const RotationMap& cam_from_world,
     before = frame;
   }
   keyframes.insert(cam_from_world.rbegin()->first);
+  return keyframes;
+}
+
+}  // namespace
+
+std::optional<std::string> KeyframeOptions::Problem() const {
+  if (!(min_parallax_deg > 0.0)) {
+    return OutOfRange("min_parallax_deg", min_parallax_deg, "positive");
+  }
+  if (!(min_shared_ratio >= 0.0 && min_shared_ratio < 1.0)) {
+    return OutOfRange("min_shared_ratio", min_shared_ratio, "0 or more and below 1");
+  }
+  if (min_keyframes < 0) return OutOfRange("min_keyframes", min_keyframes, "at least 0");
+  if (every_frames < 0) return OutOfRange("every_frames", every_frames, "at least 0");
+  return std::nullopt;
+}
+
+std::set<FrameId> SelectKeyframes(const RotationMap& cam_from_world,
+                                  const std::vector<Track>& tracks,
+                                  const std::vector<HeldStretch>& held,
+                                  const KeyframeOptions& options) {
+  if (const auto problem = options.Problem())
+    throw std::invalid_argument("KeyframeOptions: " + *problem);
+  if (cam_from_world.empty()) return {};
+  const auto rays_of = RaysOfFrames(cam_from_world, tracks);
+  constexpr int kMaxHalvings = 4;
+  KeyframeOptions asked = options;
+  std::set<FrameId> keyframes = SelectFrom(cam_from_world, rays_of, held, asked);
+  for (int k = 0; k < kMaxHalvings && options.every_frames == 0; ++k) {
+    if (static_cast<int>(keyframes.size()) >= options.min_keyframes) break;
+    asked.min_parallax_deg /= 2.0;
+    keyframes = SelectFrom(cam_from_world, rays_of, held, asked);
+  }
   return keyframes;
 }
 

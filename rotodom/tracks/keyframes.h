@@ -19,6 +19,9 @@ struct KeyframeOptions {
   // It becomes one before fewer than this share of the last keyframe's tracks is left, so that
   // tracks link neighbouring keyframes.
   double min_shared_ratio = 0.35;
+  // Where these give fewer keyframes, as of a short walk, less parallax is asked for: half of it,
+  // up to four times. Two keyframes give no map, three tell a lens badly.
+  int min_keyframes = 5;
   // When positive, every so many frames one is a keyframe instead, whatever it shows; held
   // stretches have theirs all the same.
   int every_frames = 0;
@@ -29,6 +32,7 @@ struct KeyframeOptions {
   void Visit(Visitor&& visit) {
     visit("min_parallax_deg", min_parallax_deg);
     visit("min_shared_ratio", min_shared_ratio);
+    visit("min_keyframes", min_keyframes);
     visit("every_frames", every_frames);
   }
 };

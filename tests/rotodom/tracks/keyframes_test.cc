@@ -44,8 +44,8 @@ std::vector<int> Values(const std::set<FrameId>& frames) {
 
 std::vector<int> Select(const Walk& walk,
                         const std::vector<HeldStretch>& held = {},
-                        const KeyframeOptions& options = {.min_parallax_deg = 1.0,
-                                                          .min_shared_ratio = 0.6}) {
+                        const KeyframeOptions& options = {
+                            .min_parallax_deg = 1.0, .min_shared_ratio = 0.6, .min_keyframes = 0}) {
   return Values(SelectKeyframes(walk.cam_from_world, walk.tracks, held, options));
 }
 
@@ -56,7 +56,21 @@ TEST(SelectKeyframes, TakesOneWheneverTheParallaxHasGrown) {
   EXPECT_EQ(Select(MakeWalk(6, 1.5)), (List{0, 1, 2, 3, 4, 5}));
   KeyframeOptions wide;
   wide.min_parallax_deg = 2.0;
+  wide.min_keyframes = 0;
   EXPECT_EQ(Select(MakeWalk(15, 0.3), {}, wide), (List{0, 7, 14}));
+}
+
+TEST(SelectKeyframes, AShortWalkIsAskedForLessParallax) {
+  const Walk walk = MakeWalk(13, 0.12);
+  KeyframeOptions options = {.min_parallax_deg = 2.0, .min_keyframes = 2};
+  EXPECT_EQ(Select(walk, {}, options), (List{0, 12}));
+  options.min_keyframes = 3;
+  EXPECT_EQ(Select(walk, {}, options), (List{0, 9, 12}));
+  options.min_keyframes = 4;
+  EXPECT_EQ(Select(walk, {}, options), (List{0, 5, 10, 12}));
+  // Not below a sixteenth.
+  options.min_keyframes = 14;
+  EXPECT_EQ(Select(walk, {}, options), (List{0, 2, 4, 6, 8, 10, 12}));
 }
 
 TEST(SelectKeyframes, TakesEveryNthWhenAsked) {
