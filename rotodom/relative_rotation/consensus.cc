@@ -93,6 +93,51 @@ double Quantile(std::vector<double> values, double part) {
   return *at;
 }
 
+// ScoreEpipolar with the distances to the epipolar half-lines on which points in front of both
+// cameras lie; the sign of the direction that fits better counts. A plane has two motions that fit
+// all its epipolar lines, but under the wrong one about half of it lies behind the cameras.
+// @param noise  of the distances. Flow of that size goes any way: it must not make a model better
+//               that trades some rotation for translation, so that all flow goes one way.
+HypothesisScore ScoreHalfLines(const PairArrays& pairs,
+                               const EpipolarModel& model,
+                               const std::vector<double>& squared_distances,
+                               double noise,
+                               double threshold,
+                               double finest) {
+  // Both views' noise is in a distance, so a flow is longer by the root of two.
+  constexpr double kSigmas = 2.0;
+  const double any_way = kSigmas * noise;
+  const std::vector<double> squared_flows = SquaredFlows(pairs, model.j_from_i);
+  const Eigen::Matrix3d R_j_i = model.j_from_i.Matrix();
+  const double squared_threshold = threshold * threshold;
+  const double inverse_squared_finest = 1.0 / (finest * finest);
+  const double outlier = 1.0 + squared_threshold * inverse_squared_finest;
+  // One logarithm for as many factors as no product overflows with; none is above `outlier`.
+  constexpr double kLargestLog = 600.0;
+  const int block = std::max(1, static_cast<int>(kLargestLog / std::log(outlier)));
+  std::array<HypothesisScore, 2> scores;  // of the direction and of its opposite
+  std::array<double, 2> products = {1.0, 1.0};
+  for (int k = 0; k < pairs.size(); ++k) {
+    const Eigen::Vector3d g = R_j_i * pairs.BearingI(k);
+    const bool is_ahead = g.cross(pairs.BearingJ(k)).dot(g.cross(model.direction)) > 0.0;
+    // The half-line ends where the point is at infinity.
+    const double beyond_end = std::max(0.0, std::sqrt(0.5 * squared_flows[k]) - any_way);
+    const double squared_behind = std::max(squared_distances[k], beyond_end * beyond_end);
+    for (int sign = 0; sign < 2; ++sign) {
+      const double squared = is_ahead == (sign == 0) ? squared_distances[k] : squared_behind;
+      const bool is_inlier = squared < squared_threshold;
+      products[sign] *= is_inlier ? 1.0 + squared * inverse_squared_finest : outlier;
+      scores[sign].num_inliers += is_inlier;
+    }
+    if (k % block != block - 1 && k != pairs.size() - 1) continue;
+    for (int sign = 0; sign < 2; ++sign) {
+      scores[sign].score += std::log(products[sign]);
+      products[sign] = 1.0;
+    }
+  }
+  return scores[0].score <= scores[1].score ? scores[0] : scores[1];
+}
+
 class Search {
  public:
   Search(const PairArrays& pairs, double focal_px, const RelativeRotationOptions& options)
@@ -156,7 +201,14 @@ class Search {
  private:
   // Takes the model if it is better than the best so far.
   bool Consider(const EpipolarModel& model) {
-    const HypothesisScore score = ScoreEpipolar(pairs_, model, threshold_, finest_, best_score_);
+    // The lines alone are quickly told and never say more than the half-lines.
+    if (!(ScoreEpipolar(pairs_, model, threshold_, finest_, best_score_).score < best_score_)) {
+      return false;
+    }
+    const std::vector<double> squared_distances = SquaredDistances(pairs_, model);
+    const double noise = NoiseOf(squared_distances, threshold_, smallest_noise_);
+    const HypothesisScore score =
+        ScoreHalfLines(pairs_, model, squared_distances, noise, threshold_, finest_);
     if (!(score.score < best_score_)) return false;
     best_score_ = score.score;
     best_.model = model;

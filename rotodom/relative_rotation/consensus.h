@@ -18,7 +18,8 @@ struct Consensus {
   int num_samples = 0;
 };
 
-/// Searches for the model with the best score, ScoreEpipolar, over all pairs.
+/// Searches for the model with the best score over all pairs: ScoreEpipolar with the epipolar lines
+/// ended where points would be behind the cameras.
 ///
 /// With little parallax the epipolar distance has several minima, a rotation traded for a
 /// translation. So the search descends from the prediction and from the rotation that aligns the

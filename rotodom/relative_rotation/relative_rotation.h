@@ -89,7 +89,8 @@ struct RelativeRotationEstimate {
 /// included.
 ///
 /// Hypotheses come from descents on part of the matches and from small samples and are scored by
-/// the truncated Sampson distance, which stays valid as the baseline vanishes (consensus.h). The
+/// the truncated Sampson distance, which stays valid as the baseline vanishes (consensus.h), points
+/// behind the cameras being none: a plane alone has a second motion that fits all its lines. The
 /// best is refined on all matches but those that only chance makes agree: once as (rotation,
 /// translation direction) on the Sampson distance and once as rotation alone, both with a
 /// redescending loss. TestBaseline decides whether there is a baseline, Torr's geometric

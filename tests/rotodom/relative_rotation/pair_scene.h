@@ -19,6 +19,8 @@ struct PairSceneOptions {
   // anywhere, have the mean variance 2 noise_px^2, view i is exact, and every pair knows its noise.
   double noise_ratio = 1.0;
   double rotation_deg = 3.0;
+  // All points lie on a plane across the view, and the baseline is parallel to it.
+  bool plane = false;
   std::uint64_t seed = 1;
 };
 
@@ -66,12 +68,16 @@ inline PairScene MakePairScene(const PairSceneOptions& options) {
   PairScene scene;
   scene.j_from_i = Rotation::Exp(options.rotation_deg * kRadFromDeg * random_direction());
   scene.translation_direction = random_direction();
+  if (options.plane) {
+    const Eigen::Vector3d across = scene.j_from_i * Eigen::Vector3d::UnitZ();
+    scene.translation_direction = scene.translation_direction.cross(across).normalized();
+  }
   const double mean_depth = 10.0;
   const Eigen::Vector3d translation =
       options.baseline_over_depth * mean_depth * scene.translation_direction;
   while (static_cast<int>(scene.pairs.size()) < options.num_pairs) {
     // 640 x 480 at the focal length above; depths 5 to 15.
-    const double depth = mean_depth + 5.0 * uniform(random);
+    const double depth = options.plane ? mean_depth : mean_depth + 5.0 * uniform(random);
     const Eigen::Vector3d point_i(
         0.457 * uniform(random) * depth, 0.343 * uniform(random) * depth, depth);
     const Eigen::Vector3d point_j = scene.j_from_i * point_i + translation;

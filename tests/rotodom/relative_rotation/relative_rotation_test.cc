@@ -114,6 +114,29 @@ TEST(EstimateRelativeRotation, TranslationPointsForward) {
   EXPECT_GT(estimate->translation_direction.dot(scene.translation_direction), 0.999);
 }
 
+// Two motions fit all epipolar lines of a plane; the wrong one turns by the baseline over the
+// depth.
+TEST(EstimateRelativeRotation, KnowsTheMotionAlongAPlane) {
+  for (const double baseline : {0.02, 0.05, 0.15}) {
+    for (const double outlier_ratio : {0.0, 0.3}) {
+      int num_wrong = 0;
+      for (int k = 0; k < 20; ++k) {
+        const PairScene scene = MakePairScene({.baseline_over_depth = baseline,
+                                               .noise_px = 0.1,
+                                               .outlier_ratio = outlier_ratio,
+                                               .rotation_deg = 1.0,
+                                               .plane = true,
+                                               .seed = std::uint64_t(300 + k)});
+        const auto estimate =
+            EstimateRelativeRotation(scene.pairs, Rotation(), kPairFocalPx, {}, 1);
+        ASSERT_TRUE(estimate);
+        num_wrong += ErrorDeg(estimate->j_from_i, scene.j_from_i) > 0.5 * baseline * kDegFromRad;
+      }
+      EXPECT_LE(num_wrong, outlier_ratio > 0.0 ? 1 : 0) << baseline << ' ' << outlier_ratio;
+    }
+  }
+}
+
 TEST(EstimateRelativeRotation, SurvivesABadPrediction) {
   const PairScene scene =
       MakePairScene({.baseline_over_depth = 0.02, .outlier_ratio = 0.2, .rotation_deg = 8.0});
