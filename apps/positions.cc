@@ -5,6 +5,7 @@
 
 #include "apps/turning.h"
 #include "output/cloud_outliers.h"
+#include "rotodom/averaging/anchor_covariance.h"
 #include "rotodom/types/parallel.h"
 
 namespace rotslam {
@@ -152,8 +153,10 @@ Eigen::Vector3d InterpolatedCenter(const CenterMap& centers,
 }
 
 // Poses of the frames that the map does not hold.
+// @param rotation_covariance  of their rotations, where it is known.
 void PlaceRemainingFrames(const std::vector<Track>& all_tracks,
                           const std::vector<double>& timestamps_s,
+                          const std::map<FrameId, Eigen::Matrix3d>& rotation_covariance,
                           const Camera& camera,
                           const ResectionOptions& options,
                           int num_threads,
@@ -188,9 +191,11 @@ void PlaceRemainingFrames(const std::vector<Track>& all_tracks,
   ParallelFor(static_cast<int>(remaining.size()), num_threads, [&](int k) {
     const FrameId frame = remaining[k];
     const auto seen = sightings.find(frame);
-    const ResectionStart start{result.cam_from_world.at(frame),
-                               InterpolatedCenter(anchors, timestamps_s, frame),
-                               std::nullopt};
+    ResectionStart start{result.cam_from_world.at(frame),
+                         InterpolatedCenter(anchors, timestamps_s, frame),
+                         std::nullopt};
+    const auto covariance = rotation_covariance.find(frame);
+    if (covariance != rotation_covariance.end()) start.rotation_covariance = covariance->second;
     poses[k] = ResectFrame(camera, seen == sightings.end() ? kNone : seen->second, start, options);
   });
   for (std::size_t k = 0; k < remaining.size(); ++k) {
@@ -363,8 +368,16 @@ PositionResult FindPositions(const Orientations& orientations,
 
   progress.StartStage("frames between keyframes", -1);
   all_tracks = WithBearingsOf(result.camera, std::move(all_tracks));
-  PlaceRemainingFrames(
-      all_tracks, orientations.timestamps_s, result.camera, options.resection, num_threads, result);
+  PlaceRemainingFrames(all_tracks,
+                       orientations.timestamps_s,
+                       AnchorCovariances(orientations.graph,
+                                         result.cam_from_world,
+                                         AllFrames(result.map.cam_from_world),
+                                         options.rotodom.averaging),
+                       result.camera,
+                       options.resection,
+                       num_threads,
+                       result);
   // Their neighbours have moved a little since.
   InterpolateUnconnected(orientations, result.cam_from_world);
   progress.EndStage(std::to_string(result.num_resected) + " resected, " +
