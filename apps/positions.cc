@@ -5,7 +5,7 @@
 
 #include "apps/turning.h"
 #include "output/cloud_outliers.h"
-#include "rotodom/averaging/anchor_covariance.h"
+#include "rotodom/averaging/anchors.h"
 #include "rotodom/types/parallel.h"
 
 namespace rotslam {
@@ -122,22 +122,6 @@ void Append(Reconstruction& map, Reconstruction part) {
   std::move(part.tracks.begin(), part.tracks.end(), std::back_inserter(map.tracks));
 }
 
-// The orientations that the map does not hold follow those that it does.
-RotationMap FollowMap(const ViewGraph& graph,
-                      RotationMap rotations,
-                      const RotationMap& refined,
-                      const AveragingOptions& options) {
-  std::set<FrameId> free_views = AllFrames(rotations);
-  for (const auto& [frame, rotation] : refined) {
-    rotations[frame] = rotation;
-    free_views.erase(frame);
-  }
-  for (const auto& [frame, rotation] : AverageRotations(graph, rotations, free_views, options)) {
-    rotations[frame] = rotation;
-  }
-  return rotations;
-}
-
 // Position between the nearest frames that have one, linear in time.
 Eigen::Vector3d InterpolatedCenter(const CenterMap& centers,
                                    const std::vector<double>& timestamps_s,
@@ -251,8 +235,8 @@ PositionResult TurningInPlace(const PositionResult& moving,
                               const Orientations& orientations,
                               const AveragingOptions& options) {
   PositionResult result;
-  result.cam_from_world =
-      FollowMap(orientations.graph, orientations.cam_from_world, turning.cam_from_world, options);
+  result.cam_from_world = FollowAnchors(
+      orientations.graph, orientations.cam_from_world, turning.cam_from_world, options);
   InterpolateUnconnected(orientations, result.cam_from_world);
   result.camera = turning.camera;
   result.keyframes = moving.keyframes;
@@ -352,10 +336,10 @@ PositionResult FindPositions(const Orientations& orientations,
     Append(result.map, std::move(bundle.reconstruction));
     result.bundles.push_back(std::move(bundle.summary));
     result.components.push_back(std::move(component));
-    result.cam_from_world = FollowMap(orientations.graph,
-                                      std::move(result.cam_from_world),
-                                      result.map.cam_from_world,
-                                      options.rotodom.averaging);
+    result.cam_from_world = FollowAnchors(orientations.graph,
+                                          result.cam_from_world,
+                                          result.map.cam_from_world,
+                                          options.rotodom.averaging);
   }
   if (result.components.empty()) {
     if (auto turning = find_turning()) return *std::move(turning);

@@ -16,8 +16,8 @@ void TransferValue(Archive& archive, LoopCheck& check) {
 
 template <class Archive>
 void TransferValue(Archive& archive, LoopReport& report) {
-  auto& [checks, connections] = report;
-  archive(checks, connections);
+  auto& [checks, connections, waiting] = report;
+  archive(checks, connections, waiting);
 }
 
 /// One frame as AddFrame found it: to take it again without its image.

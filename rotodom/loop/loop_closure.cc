@@ -92,7 +92,8 @@ LoopClosure::LoopClosure(const Camera& camera,
       feature_options_(odometry.features),
       tools_{odometry.matching, odometry.relative_rotation, seed, num_threads},
       vocabulary_(std::move(vocabulary)),
-      finder_(vocabulary_->num_words(), options.candidates) {}
+      finder_(vocabulary_->num_words(), options.candidates),
+      waiting_(options.verification) {}
 
 LoopReport LoopClosure::AddFrame(const FrameEstimate& estimate,
                                  const cv::Mat& image,
@@ -139,11 +140,28 @@ LoopReport LoopClosure::VerifyBest(const Place& place,
                                    const RotationMap& cam_from_world,
                                    const DisjointSets& pieces) {
   LoopReport report;
+  const auto pieces_differ = [&](const RelativeRotation& edge) {
+    return pieces.Find(edge.i.value) != pieces.Find(edge.j.value);
+  };
   const std::size_t count =
       std::min(candidates.size(), static_cast<std::size_t>(options_.max_candidates));
   for (std::size_t k = 0; k < count && report.connections.empty(); ++k) {
-    report.checks.push_back(
-        Verify(place, candidates[k], cam_from_world, pieces, report.connections));
+    LoopEvidence evidence = Verify(place, candidates[k], cam_from_world, pieces);
+    if (!evidence.accepted && !evidence.connections.empty() &&
+        pieces_differ(evidence.connections.front().edge)) {
+      Connection doubtful = std::move(evidence.connections.front());
+      evidence.connections = waiting_.Confirmed(doubtful, cam_from_world, pieces);
+      evidence.accepted = !evidence.connections.empty();
+      if (!evidence.accepted) report.waiting.push_back(std::move(doubtful));
+    }
+    if (evidence.accepted) report.connections = std::move(evidence.connections);
+    report.checks.push_back({place.corners.frame,
+                             evidence.match,
+                             candidates[k].score,
+                             evidence.num_inliers,
+                             evidence.angle_deg,
+                             evidence.way,
+                             evidence.accepted});
   }
   return report;
 }
@@ -151,8 +169,10 @@ LoopReport LoopClosure::VerifyBest(const Place& place,
 void LoopClosure::Remember(Place place, const LoopReport& report) {
   const FrameId frame = place.corners.frame;
   for (const Connection& connection : report.connections) {
-    finder_.Join(connection.edge.i, frame);
+    finder_.Join(connection.edge.i, connection.edge.j);
   }
+  waiting_.Remove(report.connections);
+  for (const Connection& connection : report.waiting) waiting_.Add(connection);
   places_.emplace(frame, std::move(place));
 }
 
@@ -225,11 +245,10 @@ std::vector<LoopCandidate> LoopClosure::FindCandidates(const Place& place) {
   return finder_.AddPlace(place.corners.frame, words.bag, NeighboursOf(place));
 }
 
-LoopCheck LoopClosure::Verify(const Place& place,
-                              const LoopCandidate& candidate,
-                              const RotationMap& cam_from_world,
-                              const DisjointSets& pieces,
-                              std::vector<Connection>& connections) {
+LoopEvidence LoopClosure::Verify(const Place& place,
+                                 const LoopCandidate& candidate,
+                                 const RotationMap& cam_from_world,
+                                 const DisjointSets& pieces) {
   const Stopwatch stopwatch(seconds_.verification);
   const FrameId frame = place.corners.frame;
   std::vector<const Features*> old_places = {&places_.at(candidate.frame).corners};
@@ -245,18 +264,11 @@ LoopCheck LoopClosure::Verify(const Place& place,
                                      camera_,
                                      options_.verification,
                                      tools_);
-  connections = std::move(evidence.connections);
-  for (Connection& connection : connections) {
+  for (Connection& connection : evidence.connections) {
     connection.matches.pairs = MatchesOfFeatures(
         connection.matches.pairs, places_.at(connection.edge.i).features, place.features);
   }
-  return {frame,
-          evidence.match,
-          candidate.score,
-          evidence.num_inliers,
-          evidence.angle_deg,
-          evidence.way,
-          evidence.accepted};
+  return evidence;
 }
 
 }  // namespace rotslam

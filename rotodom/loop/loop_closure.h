@@ -12,6 +12,7 @@
 #include "rotodom/loop/candidates.h"
 #include "rotodom/loop/verification.h"
 #include "rotodom/loop/vocabulary.h"
+#include "rotodom/loop/waiting_edges.h"
 #include "rotodom/odometry.h"
 #include "rotodom/types/disjoint_sets.h"
 
@@ -74,7 +75,10 @@ struct LoopCheck {
 /// What became of one frame.
 struct LoopReport {
   std::vector<LoopCheck> checks;
-  std::vector<Connection> connections;  // from older places to it, accepted ones only
+  // Accepted ones, the most certain one first: from older places to it, or to an older one that
+  // its own confirm.
+  std::vector<Connection> connections;
+  std::vector<Connection> waiting;  // from older places to it, for others to confirm
 };
 
 /// Where the time goes, seconds since the start.
@@ -156,11 +160,11 @@ class LoopClosure {
   std::vector<FrameId> NeighboursOf(const Place& place) const;
   // From now on it is one itself.
   std::vector<LoopCandidate> FindCandidates(const Place& place);
-  LoopCheck Verify(const Place& place,
-                   const LoopCandidate& candidate,
-                   const RotationMap& cam_from_world,
-                   const DisjointSets& pieces,
-                   std::vector<Connection>& connections);
+  // What was compared with the candidate; its edges name the place's features.
+  LoopEvidence Verify(const Place& place,
+                      const LoopCandidate& candidate,
+                      const RotationMap& cam_from_world,
+                      const DisjointSets& pieces);
 
   Camera camera_;
   LoopOptions options_;
@@ -168,6 +172,7 @@ class LoopClosure {
   VerificationTools tools_;
   std::shared_ptr<const Vocabulary> vocabulary_;
   CandidateFinder finder_;
+  WaitingEdges waiting_;
   std::map<FrameId, Place> places_;
   std::optional<PendingPlace> pending_;
   std::map<FrameId, double> timestamps_s_;

@@ -13,7 +13,8 @@ namespace {
 void DropWhatTracksNeed(FrameRecord& record) {
   if (!record.corners) record.estimate.features = {};
   record.estimate.revised_features.reset();
-  for (auto* connections : {&record.estimate.connections, &record.loops.connections}) {
+  for (auto* connections :
+       {&record.estimate.connections, &record.loops.connections, &record.loops.waiting}) {
     for (Connection& connection : *connections) connection.matches.pairs.clear();
   }
 }

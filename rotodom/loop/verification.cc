@@ -117,6 +117,9 @@ std::optional<std::string> VerificationOptions::Problem() const {
     return OutOfRange("shutter_sigma_deg", shutter_sigma_deg, "zero or more");
   }
   if (min_edges < 1) return OutOfRange("min_edges", min_edges, "at least 1");
+  if (!(min_witness_deg >= 0.0)) {
+    return OutOfRange("min_witness_deg", min_witness_deg, "zero or more");
+  }
   if (sure_inliers < 0) return OutOfRange("sure_inliers", sure_inliers, "zero or more");
   if (!(max_cycle_deg > 0.0)) return OutOfRange("max_cycle_deg", max_cycle_deg, "above 0");
   if (!(max_drift_deg > 0.0)) return OutOfRange("max_drift_deg", max_drift_deg, "above 0");
@@ -206,7 +209,6 @@ LoopEvidence VerifyLoop(const Features& view,
   evidence.accepted = static_cast<int>(agreeing.size()) >= options.min_edges &&
                       (num_inliers >= options.sure_inliers || num_consistent > 1) &&
                       (!is_way_known || evidence.way.angle_deg <= drift_deg);
-  if (!evidence.accepted) return evidence;
   for (const int index : agreeing) {
     evidence.connections.push_back(std::move(opinions[index].connection));
   }

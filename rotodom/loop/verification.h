@@ -33,6 +33,9 @@ struct VerificationOptions {
   double max_cycle_deg = 1.0;
   // Edges of one place that must agree so.
   int min_edges = 2;
+  // Of edges at different frames, instead: these must look in directions that differ by this, since
+  // frames that see the same err alike.
+  double min_witness_deg = 5.0;
   // With fewer matches in all than this, the place before must have led to the same places.
   int sure_inliers = 200;
   // Orientations may have drifted by this, and by so much per square root of a frame between the
@@ -53,6 +56,7 @@ struct VerificationOptions {
     visit("shutter_sigma_deg", shutter_sigma_deg);
     visit("max_cycle_deg", max_cycle_deg);
     visit("min_edges", min_edges);
+    visit("min_witness_deg", min_witness_deg);
     visit("sure_inliers", sure_inliers);
     visit("max_drift_deg", max_drift_deg);
     visit("max_drift_deg_per_sqrt_frame", max_drift_deg_per_sqrt_frame);
@@ -84,7 +88,7 @@ struct LoopEvidence {
   double angle_deg = 0.0;
   WayAround way;
   bool accepted = false;
-  // When accepted: the edges that agree with each other, the most certain one first.
+  // The edges that agree with each other, the most certain one first, accepted or not.
   std::vector<Connection> connections;
 };
 

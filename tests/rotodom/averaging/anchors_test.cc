@@ -1,7 +1,8 @@
-#include "rotodom/averaging/anchor_covariance.h"
+#include "rotodom/averaging/anchors.h"
 
 #include <random>
 #include <stdexcept>
+#include <vector>
 
 #include <Eigen/Dense>
 #include <gtest/gtest.h>
@@ -43,6 +44,41 @@ struct Chain {
     }
   }
 };
+
+TEST(FollowAnchors, TurnsWithThemHoweverFar) {
+  const Chain chain(30);
+  const Rotation turned = Rotation::Exp({0.0, 0.4, 0.0});
+  RotationMap refined;
+  for (const int anchor : {0, 10, 20}) {
+    refined[FrameId{anchor}] = chain.truth.at(FrameId{anchor}) * turned;
+  }
+  const RotationMap following = FollowAnchors(chain.graph, chain.truth, refined, Plain());
+  ASSERT_EQ(following.size(), chain.truth.size());
+  for (const auto& [view, rotation] : chain.truth) {
+    EXPECT_LT((following.at(view) * (rotation * turned).Inverse()).AngleDeg(), 1e-6) << view.value;
+  }
+}
+
+TEST(FollowAnchors, SharesOutWhatTwoOfThemDifferBy) {
+  Chain chain(11);
+  for (RelativeRotation edge : std::vector(chain.graph.edges())) {
+    edge.covariance = 1e-6 * Eigen::Matrix3d::Identity();
+    chain.graph.AddEdge(edge);
+  }
+  const Rotation turned = Rotation::Exp({0.0, 0.0, 0.01});
+  const RotationMap refined = {{FrameId{0}, chain.truth.at(FrameId{0})},
+                               {FrameId{10}, chain.truth.at(FrameId{10}) * turned}};
+  const RotationMap following = FollowAnchors(chain.graph, chain.truth, refined, Plain());
+  EXPECT_EQ(following.at(FrameId{10}).Quaternion().coeffs(),
+            refined.at(FrameId{10}).Quaternion().coeffs());
+  for (int k = 1; k <= 10; ++k) {
+    const FrameId i{k - 1};
+    const FrameId j{k};
+    const Rotation step = following.at(j) * following.at(i).Inverse();
+    const Rotation edge = chain.truth.at(j) * chain.truth.at(i).Inverse();
+    EXPECT_NEAR((step * edge.Inverse()).Angle(), 0.001, 1e-6) << k;
+  }
+}
 
 TEST(AnchorCovariances, GrowAlongTheWay) {
   const Chain chain(4);

@@ -1,12 +1,45 @@
-#include "rotodom/averaging/anchor_covariance.h"
+#include "rotodom/averaging/anchors.h"
 
 #include <functional>
+#include <iterator>
 #include <queue>
 #include <stdexcept>
 #include <utility>
 #include <vector>
 
 namespace rotslam {
+
+RotationMap FollowAnchors(const ViewGraph& graph,
+                          const RotationMap& cam_from_world,
+                          const RotationMap& refined,
+                          const AveragingOptions& options) {
+  const auto turn = [&](RotationMap::const_iterator anchor) {
+    return cam_from_world.at(anchor->first).Inverse() * anchor->second;
+  };
+  RotationMap following = refined;
+  std::set<FrameId> free_views;
+  for (const auto& [view, rotation] : cam_from_world) {
+    const auto after = refined.lower_bound(view);
+    if (after != refined.end() && after->first == view) continue;
+    free_views.insert(view);
+    if (after == refined.begin()) {
+      following[view] = rotation * turn(after);
+      continue;
+    }
+    const auto before = std::prev(after);
+    if (after == refined.end()) {
+      following[view] = rotation * turn(before);
+      continue;
+    }
+    const double weight = static_cast<double>(view.value - before->first.value) /
+                          (after->first.value - before->first.value);
+    following[view] = rotation * Interpolate(turn(before), turn(after), weight);
+  }
+  for (const auto& [view, rotation] : AverageRotations(graph, following, free_views, options)) {
+    following[view] = rotation;
+  }
+  return following;
+}
 
 std::map<FrameId, Eigen::Matrix3d> AnchorCovariances(const ViewGraph& graph,
                                                      const RotationMap& cam_from_world,

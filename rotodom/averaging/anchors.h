@@ -9,6 +9,17 @@
 
 namespace rotslam {
 
+/// Orientations after some have been refined: `refined` as they are, all others turned as the
+/// nearest of those before and after them have, between two in proportion to the frame numbers, and
+/// then averaged. Averaging alone would leave a start that is far off.
+/// @param cam_from_world  before, of all views.
+/// @param refined         after; not empty, views of `cam_from_world`.
+/// Throws std::invalid_argument when an option is out of range.
+RotationMap FollowAnchors(const ViewGraph& graph,
+                          const RotationMap& cam_from_world,
+                          const RotationMap& refined,
+                          const AveragingOptions& options);
+
 /// How well orientations are known against those of the nearest `anchors`, which count as exact:
 /// the covariance along the path of edges from an anchor on which its trace grows least. An edge
 /// counts with options.edge_error_factor, and with what it contradicts `cam_from_world` by, so that

@@ -1,0 +1,62 @@
+#include "rotodom/loop/waiting_edges.h"
+
+#include <algorithm>
+#include <utility>
+
+namespace rotslam {
+namespace {
+
+bool IsSame(const RelativeRotation& a, const RelativeRotation& b) {
+  return a.i == b.i && a.j == b.j;
+}
+
+// The world of the piece with edge.j, as edge.i's piece sees it.
+Rotation WorldFromWorld(const RelativeRotation& edge, const RotationMap& cam_from_world) {
+  return cam_from_world.at(edge.i).Inverse() * edge.j_from_i.Inverse() * cam_from_world.at(edge.j);
+}
+
+}  // namespace
+
+void WaitingEdges::Remove(const std::vector<Connection>& connections) {
+  std::erase_if(waiting_, [&](const Connection& waiting) {
+    return std::any_of(connections.begin(), connections.end(), [&](const Connection& connection) {
+      return IsSame(waiting.edge, connection.edge);
+    });
+  });
+}
+
+std::vector<Connection> WaitingEdges::Confirmed(const Connection& connection,
+                                                const RotationMap& cam_from_world,
+                                                const DisjointSets& pieces) const {
+  const RelativeRotation& edge = connection.edge;
+  const Rotation turn = WorldFromWorld(edge, cam_from_world);
+  std::vector<Connection> agreeing = {connection};
+  const auto is_witness = [&](const Connection& other) {
+    return std::all_of(agreeing.begin(), agreeing.end(), [&](const Connection& known) {
+      const Rotation between =
+          cam_from_world.at(other.edge.j) * cam_from_world.at(known.edge.j).Inverse();
+      return between.AngleDeg() >= options_.min_witness_deg;
+    });
+  };
+  int num_inliers = edge.num_inliers;
+  for (const Connection& other : waiting_) {
+    const bool links_the_same = pieces.Find(other.edge.i.value) == pieces.Find(edge.i.value) &&
+                                pieces.Find(other.edge.j.value) == pieces.Find(edge.j.value);
+    if (!links_the_same) continue;
+    const Rotation doubt = turn.Inverse() * WorldFromWorld(other.edge, cam_from_world);
+    if (doubt.AngleDeg() > options_.max_cycle_deg) continue;
+    if (!is_witness(other)) continue;
+    num_inliers += other.edge.num_inliers;
+    agreeing.push_back(other);
+  }
+  if (static_cast<int>(agreeing.size()) < options_.min_edges ||
+      num_inliers < options_.sure_inliers) {
+    return {};
+  }
+  std::stable_sort(agreeing.begin(), agreeing.end(), [](const Connection& a, const Connection& b) {
+    return a.edge.covariance.trace() < b.edge.covariance.trace();
+  });
+  return agreeing;
+}
+
+}  // namespace rotslam
