@@ -178,12 +178,16 @@ void Checkpoint::Open(const RunIdentity& identity) {
     archive(identity_then, committed_.num_records, committed_.num_bytes, committed_.checksum);
     archive(state_);
     archive.ExpectEnd();
-    reader_ = std::make_unique<JournalReader>(folder_ / "frames.bin", committed_);
   } catch (const std::runtime_error& error) {
-    Refuse(error.what());
+    Refuse(file.string() + ": " + error.what());
   }
   if (identity_then != identity) {
     Refuse(file.string() + ": is of another run: " + Difference(identity_then, identity));
+  }
+  try {
+    reader_ = std::make_unique<JournalReader>(folder_ / "frames.bin", committed_);
+  } catch (const std::runtime_error& error) {
+    Refuse(error.what());
   }
 }
 
@@ -193,22 +197,36 @@ void Checkpoint::Refuse(const std::string& reason) {
 
 std::optional<RecordedFrame> Checkpoint::NextRecorded() {
   if (!reader_) return std::nullopt;
+  std::optional<std::string> bytes;
   try {
-    if (const std::optional<std::string> bytes = reader_->Next()) {
+    bytes = reader_->Next();
+  } catch (const std::runtime_error& error) {
+    Refuse(error.what());
+  }
+  if (bytes) {
+    try {
       RecordedFrame frame;
       ArchiveReader archive(*bytes);
       archive(frame);
       archive.ExpectEnd();
       return frame;
+    } catch (const std::runtime_error& error) {
+      Refuse((folder_ / "frames.bin").string() + ": a record " + error.what());
     }
-  } catch (const std::runtime_error& error) {
-    Refuse(error.what());
   }
   reader_.reset();
   progress_.Say("resumed: frames 0 to " + std::to_string(committed_.num_records - 1) +
                 " are from the checkpoint");
   if (every_ > 0) StartWriting();
   return std::nullopt;
+}
+
+void Checkpoint::Restore(LoopedOdometry& odometry) const {
+  try {
+    odometry.RestoreState(state_);
+  } catch (const std::runtime_error& error) {
+    Refuse((folder_ / "state.bin").string() + ": the odometry's state " + error.what());
+  }
 }
 
 void Checkpoint::StartWriting() {

@@ -14,6 +14,7 @@
 #include "apps/progress.h"
 #include "output/journal.h"
 #include "rotodom/loop/frame_record.h"
+#include "rotodom/loop/looped_odometry.h"
 
 namespace rotslam {
 
@@ -66,8 +67,8 @@ class Checkpoint {
   /// The frames of the interrupted run, one by one; nullopt after the last. Throws
   /// std::runtime_error when the journal is damaged.
   std::optional<RecordedFrame> NextRecorded();
-  /// The odometry's state after them.
-  const std::string& recorded_state() const { return state_; }
+  /// Gives the odometry the state that it had after them.
+  void Restore(LoopedOdometry& odometry) const;
 
   bool IsOn() const { return writer_ != nullptr; }
   void Append(RecordedFrame& frame);

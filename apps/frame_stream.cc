@@ -19,7 +19,7 @@ std::optional<FrameStream::Step> FrameStream::Next() {
     }
     is_replaying_ = false;
     if (num_recorded_ > 0) {
-      odometry_.RestoreState(checkpoint_->recorded_state());
+      checkpoint_->Restore(odometry_);
       sequence_.Skip(num_recorded_);
     }
   }

@@ -1,7 +1,8 @@
 #!/usr/bin/env bash
 # Installs the Debian packages that rotslam needs and that are missing; the only list of them.
-#   scripts/install_packages.sh        what building, running and testing takes
-#   scripts/install_packages.sh --ci   and what only continuous integration takes
+#   scripts/install_packages.sh          what building, running and testing takes
+#   scripts/install_packages.sh --ci     and what only continuous integration takes
+#   scripts/install_packages.sh --fuzz   and what only scripts/fuzz.sh takes
 # Works as root or through sudo; asks the network for nothing when all is there.
 set -euo pipefail
 
@@ -25,8 +26,11 @@ packages=(
 if [[ ${1:-} == --ci ]]; then
   # colmap: the tests that hand it our models; chromium: the one that opens the report; they skip without
   packages+=(clang-format-14 clang-tidy-14 chromium colmap)
+elif [[ ${1:-} == --fuzz ]]; then
+  # llvm: its symbolizer, which gives stack traces names
+  packages+=(clang-14 libclang-rt-14-dev llvm-14)
 elif [[ $# -gt 0 ]]; then
-  echo "usage: ${0##*/} [--ci]" >&2
+  echo "usage: ${0##*/} [--ci|--fuzz]" >&2
   exit 2
 fi
 

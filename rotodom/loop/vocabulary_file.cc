@@ -289,19 +289,6 @@ std::uint64_t FileSize(const BinaryHeader& header) {
          (header.has_ids != 0 ? nodes * sizeof(std::uint32_t) : 0) + sizeof(std::uint64_t);
 }
 
-std::uint64_t Checksum(std::string_view bytes) {
-  std::uint64_t sum = 0x243F6A8885A308D3U + bytes.size();
-  while (!bytes.empty()) {
-    std::uint64_t word = 0;
-    const std::size_t length = std::min(bytes.size(), sizeof(word));
-    std::memcpy(&word, bytes.data(), length);
-    bytes.remove_prefix(length);
-    sum = (sum ^ word) * 0x9E3779B97F4A7C15U;
-    sum ^= sum >> 32;
-  }
-  return sum;
-}
-
 template <class Value>
 void Append(const Value* values, std::size_t count, std::string& bytes) {
   if (count > 0) bytes.append(reinterpret_cast<const char*>(values), count * sizeof(Value));
@@ -395,12 +382,25 @@ std::string ReadRest(std::ifstream& file, std::string bytes, std::uintmax_t size
 
 }  // namespace
 
+std::uint64_t VocabularyChecksum(std::string_view bytes) {
+  std::uint64_t sum = 0x243F6A8885A308D3U + bytes.size();
+  while (!bytes.empty()) {
+    std::uint64_t word = 0;
+    const std::size_t length = std::min(bytes.size(), sizeof(word));
+    std::memcpy(&word, bytes.data(), length);
+    bytes.remove_prefix(length);
+    sum = (sum ^ word) * 0x9E3779B97F4A7C15U;
+    sum ^= sum >> 32;
+  }
+  return sum;
+}
+
 Vocabulary DecodeBinary(std::span<const char> file_bytes, const std::string& name) {
   const std::string_view all(file_bytes.data(), file_bytes.size());
   const BinaryHeader header = CheckedHeader(all, name);
   std::uint64_t checksum = 0;
   std::memcpy(&checksum, all.data() + all.size() - sizeof(checksum), sizeof(checksum));
-  if (checksum != Checksum(all.substr(0, all.size() - sizeof(checksum)))) {
+  if (checksum != VocabularyChecksum(all.substr(0, all.size() - sizeof(checksum)))) {
     throw std::runtime_error(name +
                              ": the vocabulary is damaged (its checksum differs); copy it again");
   }
@@ -454,7 +454,7 @@ std::string EncodeBinary(const Vocabulary& vocabulary) {
   Append(tree.descriptors.data() + 1, tree.descriptors.size() - 1, bytes);
   Append(word_weights.data(), word_weights.size(), bytes);
   Append(tree.ids.data(), tree.ids.size(), bytes);
-  const std::uint64_t checksum = Checksum(bytes);
+  const std::uint64_t checksum = VocabularyChecksum(bytes);
   Append(&checksum, 1, bytes);
   return bytes;
 }

@@ -1,8 +1,10 @@
 #pragma once
 
+#include <cstdint>
 #include <filesystem>
 #include <span>
 #include <string>
+#include <string_view>
 
 #include "rotodom/loop/vocabulary.h"
 
@@ -30,5 +32,8 @@ std::string EncodeBinary(const Vocabulary& vocabulary);
 
 /// The inverse of EncodeBinary; `name` stands for the file in messages.
 Vocabulary DecodeBinary(std::span<const char> bytes, const std::string& name);
+
+/// What EncodeBinary puts behind the bytes. No protection against intent.
+std::uint64_t VocabularyChecksum(std::string_view bytes);
 
 }  // namespace rotslam

@@ -132,8 +132,12 @@ void TransferValue(Archive& archive, std::vector<T>& values) {
   if constexpr (internal::kIsPlain<T>) {
     values.resize(archive.Count(values.size(), sizeof(T)));
     archive.Bytes(static_cast<void*>(values.data()), values.size() * sizeof(T));
+  } else if constexpr (Archive::kIsReader) {
+    // One by one: of a count that the bytes do fill, each may yet stand for hundreds in memory.
+    values.clear();
+    for (std::size_t left = archive.Count(0, 1); left > 0; --left) archive(values.emplace_back());
   } else {
-    values.resize(archive.Count(values.size(), 1));
+    archive.Count(values.size(), 1);
     for (T& value : values) archive(value);
   }
 }

@@ -33,6 +33,27 @@ std::vector<std::string> CutIntoFiles(std::string_view bytes, std::size_t count)
   return files;
 }
 
+std::string Damaged(std::string file, std::string_view edits) {
+  for (; edits.size() >= 4 && !file.empty(); edits.remove_prefix(4)) {
+    const auto byte = [&](std::size_t k) { return static_cast<unsigned char>(edits[k]); };
+    const std::size_t place = (byte(0) | std::size_t{byte(1)} << 8) % file.size();
+    switch (byte(2) % 4) {
+      case 0:
+        file[place] = edits[3];
+        break;
+      case 1:
+        file.replace(place, 8, std::string(1, edits[3]) + std::string(7, byte(3) < 128 ? 0 : -1));
+        break;
+      case 2:
+        file.erase(place, 1);
+        break;
+      default:
+        file.resize(place);
+    }
+  }
+  return file;
+}
+
 std::optional<std::string> ComplaintAbout(const FuzzTarget& target, std::string_view bytes) {
   static const TemporaryFolder folder;
   try {

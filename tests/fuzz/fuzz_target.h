@@ -32,6 +32,12 @@ struct RegisterFuzzTarget {
 /// ones are empty.
 std::vector<std::string> CutIntoFiles(std::string_view bytes, std::size_t count);
 
+/// What becomes of a file of ours, in a form that changes with every version, when it is damaged:
+/// each four bytes of `edits` are a place (two bytes, little-endian), what happens there (modulo
+/// four: the byte is set, the number of eight bytes is set, the byte is lost, all behind is lost)
+/// and a byte to set. No edits leave a good file.
+std::string Damaged(std::string file, std::string_view edits);
+
 /// Reads the bytes once. Good input is read, bad input refused by a std::runtime_error, that very
 /// class, whose message is one line and names the file: then the answer is nullopt. Else it is what
 /// was thrown instead; whatever is worse ends the program.

@@ -2,6 +2,7 @@
 
 #include "output/colmap_model.h"
 #include "output/g2o.h"
+#include "output/journal.h"
 #include "output/known_rotation_file.h"
 #include "output/metrics.h"
 #include "output/orientation_file.h"
@@ -72,6 +73,23 @@ const RegisterFuzzTarget colmap_binary("colmap_binary",
                                        [](std::string_view bytes, const TemporaryFolder& folder) {
                                          ReadColmap(bytes, folder, "bin");
                                        });
+
+// Three records, the last of them empty.
+const RegisterFuzzTarget journal("journal",
+                                 [](std::string_view bytes, const TemporaryFolder& folder) {
+                                   const fs::path file = folder.path() / "frames.bin";
+                                   fs::remove(file);
+                                   JournalExtent extent;
+                                   {
+                                     JournalWriter writer(file, {});
+                                     for (const char* record : {"first", "second", ""})
+                                       writer.Append(record);
+                                     extent = writer.extent();
+                                   }
+                                   folder.Write("frames.bin", Damaged(ReadWholeFile(file), bytes));
+                                   JournalReader reader(file, extent);
+                                   while (reader.Next()) continue;
+                                 });
 
 }  // namespace
 }  // namespace rotslam

@@ -106,6 +106,17 @@ const RegisterFuzzTarget loops("run_loops", ReportWith("loops.csv"));
 const RegisterFuzzTarget graph("run_graph", ReportWith("view_graph.g2o"));
 const RegisterFuzzTarget cloud("run_cloud", ReportWith("map_all_frames.bin"));
 
+const RegisterFuzzTarget poses("run_poses", ReportWith("trajectory_tum.txt"));
+
+const RegisterFuzzTarget truth("run_truth",
+                               [](std::string_view bytes, const TemporaryFolder& folder) {
+                                 const fs::path file =
+                                     folder.Write("truth.txt", std::string(bytes));
+                                 RunData run = ReadWith("notes.txt", "", folder);
+                                 AddTruth({file.string(), ""}, {}, run);
+                                 EmbeddedJson(PageData(run, {}, {}));
+                               });
+
 const RegisterFuzzTarget map("run_map", [](std::string_view bytes, const TemporaryFolder& folder) {
   const RunData run = ReadWith("map.bin", bytes, folder);
   EmbeddedJson(PageData(run, {}, {}));

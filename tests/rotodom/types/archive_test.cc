@@ -148,5 +148,29 @@ TEST(Archive, BelievesNoCountThatTheBytesCannotFill) {
   }
 }
 
+struct Counted {
+  static inline int num_made = 0;
+  double number = 0.0;
+
+  Counted() { ++num_made; }
+  template <class Archive>
+  void Transfer(Archive& archive) {
+    archive(number);
+  }
+};
+
+// Each byte could be an element as far as the count knows.
+TEST(Archive, MakesNoMoreElementsThanTheBytesFill) {
+  ArchiveWriter writer;
+  std::size_t count = 5 * sizeof(double);
+  writer(count);
+  const std::string bytes = writer.TakeBytes() + std::string(count, '\0');
+  ArchiveReader reader(bytes);
+  std::vector<Counted> read;
+  Counted::num_made = 0;
+  EXPECT_THROW(reader(read), std::runtime_error);
+  EXPECT_EQ(Counted::num_made, 6);
+}
+
 }  // namespace
 }  // namespace rotslam
