@@ -169,6 +169,8 @@ TEST(SolveKnownRotation, LargeComponentsGoWithoutABracketButForPositionsThatNeed
   EXPECT_EQ(large.center_in_world, whole.center_in_world);
   options.start = "bisection";
   EXPECT_EQ(Solve(scene, options).status, KrotStatus::kConverged);
+  options.max_bracket_views = 0;
+  EXPECT_THROW(Solve(scene, options), std::invalid_argument);
 }
 
 TEST(SolveKnownRotation, CancelledItKeepsPositionsAndAValidBracket) {
