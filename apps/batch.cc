@@ -14,6 +14,7 @@
 #include "apps/batch/record.h"
 #include "apps/batch/slurm.h"
 #include "apps/batch/table.h"
+#include "apps/checkpoint.h"
 #include "apps/command.h"
 #include "apps/progress.h"
 #include "apps/run_directory.h"
@@ -33,6 +34,7 @@ struct BatchFlags {
   int only = 0;  // number of the one sequence to run, from 1; 0: all
   bool collect = false;
   std::string slurm;
+  CheckpointFlags checkpoint;  // `resume` is decided for each sequence
 
   int ThreadsPerJob() const { return std::max(1, common.NumThreads() / jobs); }
 };
@@ -55,7 +57,7 @@ std::vector<Task> TasksOf(const BatchFlags& flags) {
   return tasks;
 }
 
-std::vector<std::string> ArgumentsOf(const Task& task, const BatchFlags& flags) {
+std::vector<std::string> ArgumentsOf(const Task& task, bool resume, const BatchFlags& flags) {
   const BatchEntry& entry = task.entry;
   std::vector<std::string> arguments = {entry.command,
                                         entry.path,
@@ -66,7 +68,10 @@ std::vector<std::string> ArgumentsOf(const Task& task, const BatchFlags& flags) 
                                         "--threads",
                                         std::to_string(flags.ThreadsPerJob()),
                                         "--seed",
-                                        std::to_string(flags.common.seed)};
+                                        std::to_string(flags.common.seed),
+                                        "--checkpoint-every",
+                                        std::to_string(flags.checkpoint.every)};
+  if (resume) arguments.emplace_back("--resume");
   const auto add = [&](const char* name, const std::string& value) {
     if (value.empty()) return;
     arguments.emplace_back(name);
@@ -112,32 +117,34 @@ class Runner {
 
   void Start(int k) {
     const Task& task = tasks_[k];
+    const bool resume = WasInterrupted(task.directory, task.request);
     try {
       PrepareRunDirectory(task.directory.string());
       // What says that a run is whole must not be left from an older one.
-      for (const char* name : {"batch.json", "summary.json"}) fs::remove(task.directory / name);
+      fs::remove(task.directory / "summary.json");
       ReplaceFile(task.directory / "batch_options.yaml", OptionsFileOf(task.entry));
-      children_.Start(k, ArgumentsOf(task, flags_), LogOf(k));
+      WriteRecord(task.directory, {task.request, std::nullopt, ""});
+      children_.Start(k, ArgumentsOf(task, resume, flags_), LogOf(k));
     } catch (const std::runtime_error& error) {
       progress_.Warn(Name(k) + error.what());
       ++num_failed_;
       return;
     }
-    progress_.Say(Name(k) + "started");
+    progress_.Say(Name(k) + (resume ? "goes on where it was interrupted" : "started"));
   }
 
   void Finish(const std::pair<int, ChildEnd>& ended) {
     const int k = ended.first;
     BatchRecord record{tasks_[k].request, ended.second, ""};
-    if (record.end.exit_code != 0) record.error = LastErrorLine(LogOf(k));
+    if (record.end->exit_code != 0) record.error = LastErrorLine(LogOf(k));
     WriteRecord(tasks_[k].directory, record);
-    if (record.end.exit_code == 0) {
+    if (record.end->exit_code == 0) {
       char seconds[80];
       std::snprintf(seconds,
                     sizeof(seconds),
                     "done in %.1f s, %.1f s of processor time",
-                    record.end.wall_s,
-                    record.end.cpu_s);
+                    record.end->wall_s,
+                    record.end->cpu_s);
       progress_.Say(Name(k) + seconds);
     } else {
       progress_.Warn(Name(k) + ReasonOf(record) + " (" + LogOf(k).string() + ")");
@@ -181,6 +188,7 @@ int WriteSlurm(const std::vector<Task>& tasks, const BatchFlags& flags) {
   job.out = absolute(flags.out);
   job.config = absolute(flags.common.config);
   job.seed = std::to_string(flags.common.seed);
+  job.checkpoint_every = flags.checkpoint.every;
   job.num_sequences = static_cast<int>(tasks.size());
   if (flags.jobs_given) job.max_running = flags.jobs;
   job.num_threads = flags.ThreadsPerJob();
@@ -238,6 +246,7 @@ void AddBatchCommand(CLI::App& app, Action& action) {
       "--slurm", flags->slurm, "Run nothing, write an array job of Slurm to this file");
   only->excludes(collect)->excludes(slurm);
   collect->excludes(slurm);
+  AddCheckpointEveryFlag(*command, flags->checkpoint);
   AddCommonFlags(*command, flags->common);
   command->footer(
       "A list, of which only the first line must be there; paths count from its folder:\n"
@@ -252,7 +261,8 @@ void AddBatchCommand(CLI::App& app, Action& action) {
       "    config: kitti.yaml                # else --config\n"
       "    options: {loop: {use_loops: false}, sequence: {stride: 2}}  # over those of config\n"
       "Each sequence leaves batch.json (how it went) and log.txt beside its results; what is done\n"
-      "with the same options is skipped the next time, what failed is tried again.\n"
+      "with the same options is skipped the next time, what was interrupted goes on from its last\n"
+      "checkpoint, what failed is tried again from its first frame.\n"
       "Example: rotslam batch kitti.yaml --jobs 4 --out runs/kitti");
   command->callback([flags, jobs, &action] {
     flags->jobs_given = jobs->count() > 0;

@@ -97,13 +97,17 @@ std::string Difference(const RunIdentity& was, const RunIdentity& is) {
 
 }  // namespace
 
-void AddCheckpointFlags(CLI::App& command, CheckpointFlags& flags) {
+void AddCheckpointEveryFlag(CLI::App& command, CheckpointFlags& flags) {
   command
       .add_option(
           "--checkpoint-every",
           flags.every,
           "Frames after which the work so far is kept for --resume; 0: never (default: 500)")
       ->check(AtLeastZero());
+}
+
+void AddCheckpointFlags(CLI::App& command, CheckpointFlags& flags) {
+  AddCheckpointEveryFlag(command, flags);
   command.add_flag("--resume",
                    flags.resume,
                    "Go on where an interrupted run with the same --out stopped; the result is that "

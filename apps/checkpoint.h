@@ -24,6 +24,8 @@ struct CheckpointFlags {
 };
 
 void AddCheckpointFlags(CLI::App& command, CheckpointFlags& flags);
+/// Without --resume.
+void AddCheckpointEveryFlag(CLI::App& command, CheckpointFlags& flags);
 
 /// What orientations depend on, by name: a run goes on from a checkpoint where all of it is the
 /// same.

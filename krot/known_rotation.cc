@@ -145,9 +145,10 @@ BisectionStatus BoundResidual(const RotationMap& cam_from_world,
   BisectionResult bracket;
   bracket.status = BisectionStatus::kIterationLimit;
   bracket.gamma_high = MaxBoxResidual(problem, kept.structure);
-  if (options.use_bracket) {
+  const bool decides = options.start == "bisection";
+  if (options.use_bracket && (decides || problem.num_views() <= options.max_bracket_views)) {
     bracket = MinimiseMaxResidual(problem, options.bisection, &kept.structure);
-    if (options.start == "bisection" && bracket.gamma_high < kInfinity) {
+    if (decides && bracket.gamma_high < kInfinity) {
       TakeCenters(kept.named.views, bracket.structure.center_in_world, centers);
     }
   }

@@ -19,6 +19,8 @@ std::optional<std::string> KrotOptions::Problem() const {
     return OutOfRange("threshold_sigmas", threshold_sigmas, "at least 0");
   }
   if (!(loose_factor >= 1.0)) return OutOfRange("loose_factor", loose_factor, "at least 1");
+  if (max_bracket_views < 1)
+    return OutOfRange("max_bracket_views", max_bracket_views, "at least 1");
   if (max_lp_views < 2) return OutOfRange("max_lp_views", max_lp_views, "at least 2");
   if (observations_per_view < 4) {
     return OutOfRange("observations_per_view", observations_per_view, "at least 4");

@@ -29,6 +29,10 @@ struct KrotOptions {
   double loose_factor = 2.0;
   // Find [gamma_low, gamma_high] of all observations that fit the start.
   bool use_bracket = true;
+  // Components with more views keep the start's residual as gamma_high and prove no gamma_low,
+  // unless `start` needs the bracket: positions do not gain by it, and its time grows faster than
+  // the sequence (docs/performance.md).
+  int max_bracket_views = 1000;
   // Views that go into the start's programs. Components with more start from this many and grow
   // view by view from there.
   int max_lp_views = 1000;
@@ -62,6 +66,7 @@ struct KrotOptions {
     visit("threshold_sigmas", threshold_sigmas);
     visit("loose_factor", loose_factor);
     visit("use_bracket", use_bracket);
+    visit("max_bracket_views", max_bracket_views);
     visit("max_lp_views", max_lp_views);
     visit("observations_per_view", observations_per_view);
     visit("min_lp_parallax_deg", min_lp_parallax_deg);

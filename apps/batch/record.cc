@@ -96,13 +96,14 @@ std::optional<BatchRecord> ReadRecord(const fs::path& directory) {
   try {
     BatchRecord record;
     record.request = json->at("request").dump();
+    if (json->at("exit_code").is_null()) return record;
     const auto exit_code = Integer(json->at("exit_code"));
     const auto max_memory_kb = Integer(json->at("max_memory_kb"));
     if (!exit_code || !max_memory_kb) return std::nullopt;
-    record.end.exit_code = static_cast<int>(*exit_code);
-    record.end.cpu_s = json->at("cpu_s").get<double>();
-    record.end.wall_s = json->at("wall_s").get<double>();
-    record.end.max_memory_kb = *max_memory_kb;
+    record.end = ChildEnd{static_cast<int>(*exit_code),
+                          json->at("cpu_s").get<double>(),
+                          json->at("wall_s").get<double>(),
+                          *max_memory_kb};
     record.error = json->at("error").get<std::string>();
     return record;
   } catch (const Json::exception&) {
@@ -111,12 +112,15 @@ std::optional<BatchRecord> ReadRecord(const fs::path& directory) {
 }
 
 void WriteRecord(const fs::path& directory, const BatchRecord& record) {
-  const Json json = {{"exit_code", record.end.exit_code},
-                     {"error", record.error},
-                     {"cpu_s", record.end.cpu_s},
-                     {"wall_s", record.end.wall_s},
-                     {"max_memory_kb", record.end.max_memory_kb},
-                     {"request", Json::parse(record.request)}};
+  Json json = {{"exit_code", nullptr}};
+  if (record.end) {
+    json = {{"exit_code", record.end->exit_code},
+            {"error", record.error},
+            {"cpu_s", record.end->cpu_s},
+            {"wall_s", record.end->wall_s},
+            {"max_memory_kb", record.end->max_memory_kb}};
+  }
+  json["request"] = Json::parse(record.request);
   // A child may print any bytes.
   ReplaceFile(directory / kRecordFile,
               json.dump(2, ' ', false, Json::error_handler_t::replace) + "\n");
@@ -124,8 +128,14 @@ void WriteRecord(const fs::path& directory, const BatchRecord& record) {
 
 bool IsFinished(const fs::path& directory, const std::string& request) {
   const std::optional<BatchRecord> record = ReadRecord(directory);
-  return record && record->end.exit_code == 0 && record->request == request &&
+  return record && record->end && record->end->exit_code == 0 && record->request == request &&
          ReadJsonObject(directory / "summary.json").has_value();
+}
+
+bool WasInterrupted(const fs::path& directory, const std::string& request) {
+  const std::optional<BatchRecord> record = ReadRecord(directory);
+  // From 128 on a signal has ended it; Interruption::kExitCode is one of these.
+  return record && record->request == request && (!record->end || record->end->exit_code > 128);
 }
 
 std::string LastErrorLine(const fs::path& log) {
@@ -145,7 +155,8 @@ std::string LastErrorLine(const fs::path& log) {
 }
 
 std::string ReasonOf(const BatchRecord& record) {
-  const int code = record.end.exit_code;
+  if (!record.end) return "started, the end is not known";
+  const int code = record.end->exit_code;
   if (code == 0) return "";
   const std::string how =
       code > 128 ? "signal " + std::to_string(code - 128) : "exit code " + std::to_string(code);
@@ -168,10 +179,14 @@ BatchResult ResultOf(const BatchEntry& entry,
     result.note = "ran with other options, paths or another version";
     return result;
   }
-  result.cpu_s = record->end.cpu_s;
   result.note = ReasonOf(*record);
+  if (!record->end) {
+    result.status = "unfinished";
+    return result;
+  }
+  result.cpu_s = record->end->cpu_s;
   const std::optional<Json> summary = ReadJsonObject(directory / "summary.json");
-  result.status = record->end.exit_code == 0 && summary ? "done" : "failed";
+  result.status = record->end->exit_code == 0 && summary ? "done" : "failed";
   if (!summary) {
     if (result.note.empty()) result.note = "summary.json is missing or not whole";
     return result;

@@ -21,7 +21,8 @@ std::string OptionsFileOf(const BatchEntry& entry);
 /// How one sequence went: batch.json in the folder of its results.
 struct BatchRecord {
   std::string request;
-  ChildEnd end;
+  // nullopt: started, and nobody was there to see the end.
+  std::optional<ChildEnd> end;
   std::string error;  // the line that says why it failed
 };
 
@@ -32,6 +33,10 @@ void WriteRecord(const std::filesystem::path& directory, const BatchRecord& reco
 
 /// Whether this very request has been met, its results being whole.
 bool IsFinished(const std::filesystem::path& directory, const std::string& request);
+
+/// Whether a run with this very request was stopped from outside: by Ctrl-C, by a signal, or
+/// together with the batch. What it has left is to be gone on from.
+bool WasInterrupted(const std::filesystem::path& directory, const std::string& request);
 
 /// The last line of a log that reports an error, without "rotslam: "; else the last line.
 std::string LastErrorLine(const std::filesystem::path& log);
@@ -49,7 +54,9 @@ struct BatchResult {
   std::optional<double> ate;  // in the ground truth's unit, metres
   std::optional<std::int64_t> points;
   std::optional<double> cpu_s;
-  std::string status;  // "done", "failed", "not run", "outdated": ran with another request
+  // "done", "failed", "not run", "unfinished": runs, or was stopped together with the batch,
+  // "outdated": ran with another request
+  std::string status;
   std::string note;    // why it failed, or could not be compared
   std::string report;  // page about the run, relative to --out; empty: there is none
 };

@@ -28,7 +28,8 @@ std::string SlurmScript(const SlurmJob& job) {
       "\n# What a task prints goes to $out/slurm, see below.\n"
       "#SBATCH --output=/dev/null\n\n";
   script += "program=" + Quoted(job.program) + "\nlist=" + Quoted(job.list) +
-            "\nout=" + Quoted(job.out) + "\noptions=(--seed " + job.seed;
+            "\nout=" + Quoted(job.out) + "\noptions=(--seed " + job.seed + " --checkpoint-every " +
+            std::to_string(job.checkpoint_every);
   if (!job.config.empty()) script += " --config " + Quoted(job.config);
   script +=
       ")\n\nset -eu\n"

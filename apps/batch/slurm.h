@@ -11,6 +11,7 @@ struct SlurmJob {
   std::string out;
   std::string config;  // as --config; empty: none
   std::string seed;
+  int checkpoint_every = 0;
   int num_sequences = 0;
   int max_running = 0;  // tasks at a time; 0: as many as the cluster gives
   int num_threads = 1;  // cores of a task

@@ -1,5 +1,6 @@
 // `rotslam batch`: good and bad sequences together, again, collected, and as an array job.
 
+#include <algorithm>
 #include <cstdlib>
 #include <filesystem>
 #include <map>
@@ -130,6 +131,7 @@ TEST_F(Batch, SurvivesABrokenSequenceAndGoesOnWhereItStopped) {
   const CommandResult second = RunBatch(list);
   EXPECT_EQ(second.exit_code, 1);
   EXPECT_THAT(second.error, HasSubstr("walk: done before"));
+  EXPECT_THAT(second.error, HasSubstr("broken: started")) << "no checkpoint to go on from";
   EXPECT_EQ(Written(Out() / "walk/summary.json"), walk_written);
   EXPECT_NE(Written(Out() / "broken/batch.json"), broken_written);
 
@@ -193,6 +195,143 @@ TEST_F(Batch, StopsInGoodOrderAndGoesOn) {
   results = Results();
   EXPECT_EQ(results["walk"]["status"], "done");
   EXPECT_EQ(results["gimbal"]["status"], "done");
+}
+
+// A long sequence that is stopped in its middle, however that comes about.
+class InterruptedBatch : public Batch {
+ protected:
+  void SetUp() override {
+    std::vector<fs::path> images;
+    for (const auto& entry : fs::directory_iterator(shared_->path() / "handheld/rgb")) {
+      images.push_back(entry.path());
+    }
+    std::sort(images.begin(), images.end());
+    ASSERT_EQ(images.size(), 24u);
+    fs::create_directories(Long());
+    for (int k = 0; k < kNumImages; ++k) {
+      const int turn = k % 46;  // there and back, so that neighbours match
+      fs::create_hard_link(images[turn < 24 ? turn : 46 - turn], ImageOfLong(k));
+    }
+  }
+
+  static constexpr int kNumImages = 150;
+  fs::path Long() const { return folder_.path() / "long"; }
+  fs::path ImageOfLong(int k) const { return Long() / (std::to_string(10000 + k) + ".png"); }
+  fs::path State() const { return Out() / "long/unfinished/state.bin"; }
+  std::string Log() const { return ReadWholeFile(Out() / "long/log.txt"); }
+
+  fs::path LongList(const std::string& features = "400") const {
+    return folder_.Write("long.yaml",
+                         "- path: " + Long().string() + "\n  command: rotations\n  camera: " +
+                             (shared_->path() / "handheld/camera.yaml").string() +
+                             "\n  options: {loop: {use_loops: false}, rotodom: {features: "
+                             "{max_features: " +
+                             features + "}}}\n");
+  }
+
+  // Starts a batch and waits for the first checkpoint; the batch then stands still, its child
+  // works.
+  pid_t StartAndHold(const fs::path& list) const {
+    const pid_t batch = fork();
+    if (batch == 0) {
+      signal(SIGINT, SIG_DFL);
+      execl(ROTSLAM_EXECUTABLE,
+            "rotslam",
+            "batch",
+            list.c_str(),
+            "--out",
+            Out().c_str(),
+            "--threads=1",
+            "--checkpoint-every=5",
+            "--quiet",
+            nullptr);
+      _exit(127);
+    }
+    while (!fs::exists(State()) && waitpid(batch, nullptr, WNOHANG) == 0) usleep(1000);
+    EXPECT_TRUE(fs::exists(State()));
+    kill(batch, SIGSTOP);
+    return batch;
+  }
+
+  static pid_t ChildOf(pid_t batch) {
+    const std::string id = std::to_string(batch);
+    return static_cast<pid_t>(
+        std::stoi(ReadWholeFile(fs::path("/proc") / id / "task" / id / "children")));
+  }
+
+  static int End(pid_t batch) {
+    int status = 0;
+    waitpid(batch, &status, 0);
+    return WIFEXITED(status) ? WEXITSTATUS(status) : -WTERMSIG(status);
+  }
+
+  void ExpectWhatARunInOnePieceGives(const fs::path& list) const {
+    const fs::path whole = folder_.path() / "whole";
+    ASSERT_EQ(Rotslam({"batch", list.string(), "--out", whole.string(), "--quiet"}).exit_code, 0);
+    for (const char* name : {"rotations_tum.txt", "rotations.csv", "loops.csv", "view_graph.g2o"}) {
+      EXPECT_EQ(ReadWholeFile(Out() / "long" / name), ReadWholeFile(whole / "long" / name)) << name;
+    }
+    EXPECT_FALSE(fs::exists(Out() / "long/unfinished"));
+  }
+};
+
+enum class Stop { kInterrupt, kKillChild, kKillAll };
+
+class StoppedBatch : public InterruptedBatch, public testing::WithParamInterface<Stop> {};
+INSTANTIATE_TEST_SUITE_P(Ways,
+                         StoppedBatch,
+                         testing::Values(Stop::kInterrupt, Stop::kKillChild, Stop::kKillAll));
+
+TEST_P(StoppedBatch, GoesOnInTheMiddleOfASequence) {
+  const fs::path list = LongList();
+  const pid_t batch = StartAndHold(list);
+  const pid_t child = ChildOf(batch);
+  if (GetParam() == Stop::kInterrupt) kill(batch, SIGINT);
+  if (GetParam() != Stop::kInterrupt) kill(child, SIGKILL);
+  if (GetParam() == Stop::kKillAll) kill(batch, SIGKILL);
+  kill(batch, SIGCONT);
+  const std::map<Stop, int> exit_codes = {
+      {Stop::kInterrupt, 130}, {Stop::kKillChild, 1}, {Stop::kKillAll, -SIGKILL}};
+  EXPECT_EQ(End(batch), exit_codes.at(GetParam()));
+  ASSERT_TRUE(fs::exists(State()));
+  EXPECT_EQ(RunBatch(list, {"--collect"}).exit_code, 1);
+  EXPECT_EQ(Results()["long"]["status"], GetParam() == Stop::kKillAll ? "unfinished" : "failed");
+
+  const CommandResult second = RunBatch(list);
+  EXPECT_EQ(second.exit_code, 0) << second.error;
+  EXPECT_THAT(second.error, HasSubstr("long: goes on where it was interrupted"));
+  EXPECT_THAT(Log(), HasSubstr("resumed: frames 0 to "));
+  EXPECT_EQ(Results()["long"]["status"], "done");
+  EXPECT_EQ(Results()["long"]["frames"], std::to_string(kNumImages));
+  ExpectWhatARunInOnePieceGives(list);
+}
+
+TEST_F(InterruptedBatch, StartsAnewWhenAskedForSomethingElse) {
+  const pid_t batch = StartAndHold(LongList());
+  kill(ChildOf(batch), SIGKILL);
+  kill(batch, SIGCONT);
+  EXPECT_EQ(End(batch), 1);
+  const fs::path list = LongList("300");
+  const CommandResult second = RunBatch(list);
+  EXPECT_EQ(second.exit_code, 0) << second.error;
+  EXPECT_THAT(second.error, HasSubstr("long: started"));
+  EXPECT_THAT(Log(), Not(HasSubstr("resumed")));
+  ExpectWhatARunInOnePieceGives(list);
+}
+
+TEST_F(InterruptedBatch, SaysThatTheImagesHaveChangedAndThenStartsAnew) {
+  const fs::path list = LongList();
+  const pid_t batch = StartAndHold(list);
+  kill(ChildOf(batch), SIGKILL);
+  kill(batch, SIGCONT);
+  EXPECT_EQ(End(batch), 1);
+  fs::create_hard_link(ImageOfLong(kNumImages % 46), ImageOfLong(kNumImages));
+  EXPECT_EQ(RunBatch(list).exit_code, 1);
+  EXPECT_THAT(ReadWholeFile(Out() / "results.csv"), HasSubstr("is of another run: the sequence"));
+  const CommandResult third = RunBatch(list);
+  EXPECT_EQ(third.exit_code, 0) << third.error;
+  EXPECT_THAT(third.error, HasSubstr("long: started"));
+  EXPECT_EQ(Results()["long"]["frames"], std::to_string(kNumImages + 1));
 }
 
 TEST_F(Batch, RunsAsAnArrayJob) {

@@ -151,6 +151,28 @@ TEST(SolveKnownRotation, BracketCoversWhatItKeepsAndNamesWhatHoldsIt) {
   }
 }
 
+TEST(SolveKnownRotation, LargeComponentsGoWithoutABracketButForPositionsThatNeedIt) {
+  SceneOptions scene_options = Street(20, 1000);
+  scene_options.noise_px = 0.7;
+  const Scene scene = MakeScene(scene_options);
+  const KrotSolution whole = Solve(scene);
+  KrotOptions options;
+  options.max_bracket_views = 20;
+  EXPECT_EQ(Solve(scene, options).gamma_low, whole.gamma_low);
+  options.max_bracket_views = 19;
+  const KrotSolution large = Solve(scene, options);
+  ASSERT_TRUE(large.Usable()) << large.message;
+  EXPECT_EQ(large.status, KrotStatus::kIterationLimit);
+  EXPECT_EQ(large.gamma_low, 0.0);
+  EXPECT_GE(large.gamma_high, whole.gamma_low);
+  EXPECT_EQ(large.num_bracket_observations, whole.num_bracket_observations);
+  EXPECT_EQ(large.center_in_world, whole.center_in_world);
+  options.start = "bisection";
+  EXPECT_EQ(Solve(scene, options).status, KrotStatus::kConverged);
+  options.max_bracket_views = 0;
+  EXPECT_THROW(Solve(scene, options), std::invalid_argument);
+}
+
 TEST(SolveKnownRotation, CancelledItKeepsPositionsAndAValidBracket) {
   SceneOptions scene_options = Street(20, 1000);
   scene_options.noise_px = 0.7;

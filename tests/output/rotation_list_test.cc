@@ -1,0 +1,139 @@
+#include "output/rotation_list.h"
+
+#include <cmath>
+#include <map>
+#include <string>
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include "tests/output/temporary_folder.h"
+
+namespace rotslam {
+namespace {
+
+using testing::ElementsAre;
+using testing::HasSubstr;
+
+constexpr double kSigmaRad = 0.01;
+
+class RotationListTest : public testing::Test {
+ protected:
+  RotationList Read(const std::string& content) const {
+    return ReadRotationList(folder_.Write("graph", content), kSigmaRad);
+  }
+
+  const TemporaryFolder folder_;
+};
+
+double Angle(const Rotation& a, const Rotation& b) { return (a.Inverse() * b).Angle(); }
+
+TEST_F(RotationListTest, PlainLinesTurnIIntoJ) {
+  const double h = std::sqrt(0.5);
+  const RotationList list =
+      Read("# i j qx qy qz qw\n\n18446744073709551615 7 0 0 " + std::to_string(h) + " +" +
+           std::to_string(h) + "\r\n7,9, 0 -1 0  1 0 0  0 0 1  12 13\nNOTE 1 2\n");
+  EXPECT_FALSE(list.is_pose_graph);
+  EXPECT_THAT(list.ids, ElementsAre(7u, 9u, 18446744073709551615u));
+  ASSERT_EQ(list.edges.size(), 2u);
+  const Rotation quarter = Rotation::Exp({0.0, 0.0, M_PI / 2});
+  for (const RelativeRotation& edge : list.edges) {
+    EXPECT_LT(Angle(edge.j_from_i, quarter), 1e-6);
+    EXPECT_EQ(edge.covariance, kSigmaRad * kSigmaRad * Eigen::Matrix3d::Identity());
+  }
+  EXPECT_EQ(list.edges[0].i, FrameId{2});
+  EXPECT_EQ(list.edges[0].j, FrameId{0});
+  EXPECT_EQ(list.edges[1].i, FrameId{0});
+  EXPECT_EQ(list.edges[1].j, FrameId{1});
+}
+
+TEST_F(RotationListTest, ToroAnglesAreRollPitchYawOfTheCamera) {
+  const std::string sixteen = " 1 0 0 0 0 0 1 0 0 0 0 1 0 0 0";
+  const RotationList list = Read(
+      "VERTEX3 0 1 2 3 0.1 0.2 0.3\nVERTEX3 1 0 0 0 0 0 0\n"
+      "EDGE3 0 1 0 0 0 0.1 0.2 0.3\nEDGE3 0 1 0 0 0 0.1 0.2 0.3" +
+      sixteen + " 4 0 0 16 0 25\n");
+  EXPECT_TRUE(list.is_pose_graph);
+  const Rotation world_from_cam = Rotation::Exp({0.0, 0.0, 0.3}) * Rotation::Exp({0.0, 0.2, 0.0}) *
+                                  Rotation::Exp({0.1, 0.0, 0.0});
+  EXPECT_LT(Angle(list.cam_from_world.at(FrameId{0}), world_from_cam.Inverse()), 1e-12);
+  EXPECT_EQ(list.center_in_world.at(FrameId{0}), Eigen::Vector3d(1, 2, 3));
+  ASSERT_EQ(list.edges.size(), 2u);
+  EXPECT_LT(Angle(list.edges[0].j_from_i, world_from_cam.Inverse()), 1e-12);
+  EXPECT_EQ(list.edges[0].covariance, kSigmaRad * kSigmaRad * Eigen::Matrix3d::Identity());
+  const Eigen::Vector3d variances(0.25, 1.0 / 16.0, 0.04);
+  EXPECT_LT((list.edges[1].covariance - Eigen::Matrix3d(variances.asDiagonal())).norm(), 1e-12);
+}
+
+TEST_F(RotationListTest, PoseGraphComesBackWithItsIdsAndDirections) {
+  RotationList written;
+  written.ids = {3, 1000000000000, 1000000000007};
+  written.is_pose_graph = true;
+  RotationMap cam_from_world;
+  for (int view = 0; view < 3; ++view) {
+    cam_from_world[FrameId{view}] = Rotation::Exp({0.3 * view, 0.2, -0.1 * view});
+    if (view < 2) written.center_in_world[FrameId{view}] = Eigen::Vector3d(view, 2.0 * view, -1.0);
+  }
+  written.fixed = {FrameId{1}};
+  RelativeRotation edge;
+  edge.i = FrameId{2};
+  edge.j = FrameId{0};
+  edge.j_from_i = Rotation::Exp({0.3, 0.01, -0.1});
+  edge.covariance = 1e-4 * Eigen::Vector3d(1.0, 2.0, 3.0).asDiagonal();
+  edge.covariance(0, 1) = edge.covariance(1, 0) = 3e-5;
+  written.edges = {edge};
+  const auto file = folder_.path() / "graph.g2o";
+  WriteRotationList(file, written, cam_from_world);
+  const RotationList read = ReadRotationList(file, kSigmaRad);
+  EXPECT_TRUE(read.is_pose_graph);
+  EXPECT_EQ(read.ids, written.ids);
+  EXPECT_THAT(read.fixed, ElementsAre(FrameId{1}));
+  for (const auto& [view, rotation] : cam_from_world) {
+    EXPECT_LT(Angle(read.cam_from_world.at(view), rotation), 1e-11);
+  }
+  EXPECT_EQ(read.center_in_world.at(FrameId{1}), Eigen::Vector3d(1.0, 2.0, -1.0));
+  EXPECT_EQ(read.center_in_world.at(FrameId{2}), Eigen::Vector3d(0.0, 0.0, 0.0));
+  ASSERT_EQ(read.edges.size(), 1u);
+  EXPECT_EQ(read.edges[0].i, edge.i);
+  EXPECT_EQ(read.edges[0].j, edge.j);
+  EXPECT_LT(Angle(read.edges[0].j_from_i, edge.j_from_i), 1e-11);
+  EXPECT_LT((read.edges[0].covariance - edge.covariance).norm(), 1e-10 * edge.covariance.norm());
+}
+
+TEST_F(RotationListTest, OtherNamesGetALinePerView) {
+  RotationList list;
+  list.ids = {5, 8};
+  const RotationMap cam_from_world = {{FrameId{0}, Rotation()},
+                                      {FrameId{1}, Rotation::Exp({M_PI, 0.0, 0.0})}};
+  const auto file = folder_.path() / "rotations.txt";
+  WriteRotationList(file, list, cam_from_world);
+  const std::string text = ReadWholeFile(file);
+  EXPECT_THAT(text, HasSubstr("# id qx qy qz qw of cam_from_world\n5 0 0 0 1\n8 1 0 0 "));
+}
+
+TEST_F(RotationListTest, RefusesInOneLineWithItsNumber) {
+  const std::string edge = "0 1 0 0 0 1\n";
+  const std::string pose = "EDGE_SE3:QUAT 0 1 0 0 0 0 0 0 1 1 0 0 0 0 0 1 0 0 0 0 1 0 0 0 ";
+  const std::map<std::string, std::string> reasons = {
+      {"# nothing\n", "has no edges"},
+      {edge + "0 1 0 0 0\n", ":2: expected i j and a quaternion or the nine numbers"},
+      {edge + "0 1 0 0 0 2\n", ":2: the quaternion is not of unit length"},
+      {edge + "0 1 -1 0 0 0 1 0 0 0 1\n", ":2: the nine numbers are no rotation matrix"},
+      {edge + "0 1 1 0 0 0 1 0 0 0 2\n", ":2: the nine numbers are no rotation matrix"},
+      {edge + "3 3 0 0 0 1\n", ":2: an edge from a view to itself"},
+      {edge + "0 1 0 0 nan 1\n", ":2: expected a finite number, found \"nan\""},
+      {edge + "0 1x 0 0 0 1\n", ":2: expected a vertex id, found \"1x\""},
+      {edge + "0 18446744073709551616 0 0 0 1\n", ":2: expected a vertex id"},
+      {edge + "EDGE3 0 1 0 0\n", ":2: the line ends too early"},
+      {edge + "VERTEX3 0 0 0 0 0 0 1e400\n", ":2: expected a finite number"},
+      {edge + "VERTEX3 0 0 0 0 1e200 1e200 1e200\n", ":2: an angle is out of range"},
+      {edge + pose + "-1 0 0 1 0 1\n", ":2: the information of the rotation is not positive"},
+      {edge + "FIX 1\n", "FIX names 1, which has no vertex"},
+      {edge + "FIX 9\n", "FIX names 9, which has no vertex"}};
+  for (const auto& [content, reason] : reasons) {
+    EXPECT_THAT(RuntimeErrorOf([&] { Read(content); }), HasSubstr(reason)) << content;
+  }
+}
+
+}  // namespace
+}  // namespace rotslam
