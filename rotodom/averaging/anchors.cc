@@ -13,6 +13,7 @@ RotationMap FollowAnchors(const ViewGraph& graph,
                           const RotationMap& cam_from_world,
                           const RotationMap& refined,
                           const AveragingOptions& options) {
+  if (refined.empty()) throw std::invalid_argument("FollowAnchors: no view is refined");
   const auto turn = [&](RotationMap::const_iterator anchor) {
     return cam_from_world.at(anchor->first).Inverse() * anchor->second;
   };

@@ -13,8 +13,8 @@ namespace rotslam {
 /// nearest of those before and after them have, between two in proportion to the frame numbers, and
 /// then averaged. Averaging alone would leave a start that is far off.
 /// @param cam_from_world  before, of all views.
-/// @param refined         after; not empty, views of `cam_from_world`.
-/// Throws std::invalid_argument when an option is out of range.
+/// @param refined         after; views of `cam_from_world`.
+/// Throws std::invalid_argument when none is refined or an option is out of range.
 RotationMap FollowAnchors(const ViewGraph& graph,
                           const RotationMap& cam_from_world,
                           const RotationMap& refined,

@@ -1,7 +1,6 @@
 #include "rotodom/loop/waiting_edges.h"
 
 #include <algorithm>
-#include <utility>
 
 namespace rotslam {
 namespace {

@@ -80,6 +80,11 @@ TEST(FollowAnchors, SharesOutWhatTwoOfThemDifferBy) {
   }
 }
 
+TEST(FollowAnchors, WantsOne) {
+  const Chain chain(3);
+  EXPECT_THROW(FollowAnchors(chain.graph, chain.truth, {}, Plain()), std::invalid_argument);
+}
+
 TEST(AnchorCovariances, GrowAlongTheWay) {
   const Chain chain(4);
   const auto covariances = AnchorCovariances(chain.graph, chain.truth, {FrameId{0}}, Plain());

@@ -435,6 +435,8 @@ TEST(VerificationOptions, NamesTheFirstFieldOutOfRange) {
   EXPECT_TRUE(
       problem([](Options o) { o.max_cycle_deg = -1.0; }).starts_with("max_cycle_deg is -1"));
   EXPECT_TRUE(problem([](Options o) { o.min_edges = 0; }).starts_with("min_edges is 0"));
+  EXPECT_TRUE(
+      problem([](Options o) { o.min_witness_deg = -1.0; }).starts_with("min_witness_deg is -1"));
   EXPECT_TRUE(problem([](Options o) { o.sure_inliers = -1; }).starts_with("sure_inliers is -1"));
   EXPECT_TRUE(
       problem([](Options o) { o.max_drift_deg = std::nan(""); }).starts_with("max_drift_deg is "));

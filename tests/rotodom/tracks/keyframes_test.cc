@@ -158,6 +158,8 @@ TEST(KeyframeOptions, NamesTheFirstFieldOutOfRange) {
   KeyframeOptions options;
   options.every_frames = -1;
   EXPECT_TRUE(options.Problem().value_or("none").starts_with("every_frames is -1"));
+  options.min_keyframes = -1;
+  EXPECT_TRUE(options.Problem().value_or("none").starts_with("min_keyframes is -1"));
   options.min_shared_ratio = 1.0;
   EXPECT_TRUE(options.Problem().value_or("none").starts_with("min_shared_ratio is 1"));
   options.min_parallax_deg = 0.0;
