@@ -13,21 +13,6 @@
 namespace rotslam {
 namespace {
 
-// Tracks cut to the observations that fulfil `keep`; those left with fewer than two are dropped.
-template <class Keep>
-std::vector<Track> Restricted(const std::vector<Track>& tracks, const Keep& keep) {
-  std::vector<Track> result;
-  for (const Track& track : tracks) {
-    Track part;
-    part.id = track.id;
-    for (const Observation& observation : track.observations) {
-      if (keep(observation)) part.observations.push_back(observation);
-    }
-    if (part.observations.size() >= 2) result.push_back(std::move(part));
-  }
-  return result;
-}
-
 // The observations of `problem` with residual at most `limit`, without points then seen once. Every
 // view stays, so the gauge does.
 MinimaxProblem Survivors(const MinimaxProblem& problem,
@@ -89,7 +74,7 @@ std::optional<ComponentStart> StartComponent(const RotationMap& cam_from_world,
       std::min(component.views.size(), static_cast<std::size_t>(options.max_lp_views));
   const std::set<FrameId> lp_views(
       component.views.begin(), component.views.begin() + static_cast<std::ptrdiff_t>(num_lp_views));
-  const auto lp_tracks = Restricted(tracks, [&](const Observation& observation) {
+  const auto lp_tracks = RestrictTracks(tracks, [&](const Observation& observation) {
     return lp_views.contains(observation.frame) && observation.bearing.z() >= units.min_z;
   });
   std::optional<ComponentStart> start = SolvePrograms(cam_from_world, lp_tracks, options, units);
@@ -100,7 +85,7 @@ std::optional<ComponentStart> StartComponent(const RotationMap& cam_from_world,
   growth.min_angle_rad = units.lp_parallax_rad;
   growth.threshold_rad = units.loose_rad;
   const std::set<FrameId> members(component.views.begin(), component.views.end());
-  const auto member_tracks = Restricted(
+  const auto member_tracks = RestrictTracks(
       tracks, [&](const Observation& observation) { return members.contains(observation.frame); });
   const std::size_t before = start->centers.size();
   PlaceViews(cam_from_world, member_tracks, component.views, growth, start->centers);
