@@ -44,6 +44,7 @@ int Run(const RunFlags& flags) {
   auto vocabulary = OpenVocabulary(flags.input);
   const std::filesystem::path directory = PrepareRunDirectory(flags.input.out);
   RefineGuess(flags.input, flags.common, options, interruption, progress, input);
+  const double guess_s = SecondsSince(start);
   Checkpoint checkpoint(directory,
                         flags.checkpoint,
                         IdentityOf("run", input, flags.input, options, flags.common.seed),
@@ -59,10 +60,11 @@ int Run(const RunFlags& flags) {
                                                      &checkpoint);
   const UnfinishedOutputs outputs(directory);
   WriteOrientations(outputs.folder(), orientations);
-  const double orientations_s = SecondsSince(start);
+  const double orientations_s = SecondsSince(start) - guess_s;
   const auto end_early = [&] {
     RunSummary summary = StartSummary("run", input, orientations, DescribeOptions(options));
     summary.interrupted = true;
+    if (input.guess) summary.seconds.push_back({"focal_guess", guess_s});
     summary.seconds.push_back({"orientations", orientations_s});
     summary.seconds.push_back({"total", SecondsSince(start)});
     WriteSummary(outputs.folder() / "summary.json", summary);
@@ -78,7 +80,7 @@ int Run(const RunFlags& flags) {
     const LastWords last_words(interruption, end_early);
     return FindPositions(orientations, input.camera, options, flags.common.NumThreads(), progress);
   }();
-  const double positions_s = SecondsSince(start) - orientations_s;
+  const double positions_s = SecondsSince(start) - orientations_s - guess_s;
   WritePositions(outputs.folder(),
                  orientations,
                  positions,
@@ -96,6 +98,7 @@ int Run(const RunFlags& flags) {
                            {"refined_px", positions.camera.MeanFocal()}};
   }
   if (input.guess) summary.calibration = SummaryOf(*input.guess, positions.camera);
+  if (input.guess) summary.seconds.push_back({"focal_guess", guess_s});
   summary.seconds.push_back({"orientations", orientations_s});
   summary.seconds.push_back({"positions", positions_s});
   summary.seconds.push_back({"total", SecondsSince(start)});

@@ -264,7 +264,7 @@ function buildFigures(parent) {
   list('Camera', summary.camera);
 }
 
-const kStages = [['orientations', ['pyramid', 'tracking', 'detection', 'edges', 'averaging', 'covariance', 'loop_description',
+const kStages = [['focal_guess', []], ['orientations', ['pyramid', 'tracking', 'detection', 'edges', 'averaging', 'covariance', 'loop_description',
   'loop_candidates', 'loop_verification', 'global_averaging']],
 ['positions', ['known_rotation', 'bundle_adjustment', 'bundle_bridge', 'bundle_coarse', 'bundle_fine', 'bundle_lens']]];
 
