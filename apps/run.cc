@@ -32,6 +32,15 @@ struct RunFlags {
   bool use_report = true;
 };
 
+// The first frame on a part of the map, as segments.csv has it: what its first keyframes see may
+// still be held at the end of the part before.
+int FirstFrame(const std::vector<Segment>& segments, const MapComponent& part, int number) {
+  for (const Segment& segment : segments) {
+    if (segment.component == number) return segment.first_frame;
+  }
+  return part.keyframes.begin()->value;
+}
+
 int Run(const RunFlags& flags) {
   const Clock::time_point start = Clock::now();
   Interruption interruption;
@@ -105,9 +114,9 @@ int Run(const RunFlags& flags) {
   WriteSummary(outputs.folder() / "summary.json", summary);
   outputs.Publish();
 
-  for (std::size_t k = 1; k < positions.components.size(); ++k) {
+  for (int k = 1; k < std::ssize(positions.components); ++k) {
     progress.Warn("no tracks tie the scale of the map from frame " +
-                  std::to_string(positions.components[k].keyframes.begin()->value) +
+                  std::to_string(FirstFrame(*summary.segments, positions.components[k], k)) +
                   " on to the part before; it is set so that the speed is continuous");
   }
   if (input.guess) progress.Warn(WarningOf(*input.guess, positions.camera));
