@@ -3,7 +3,9 @@
 #include <algorithm>
 #include <chrono>
 #include <cmath>
+#include <iomanip>
 #include <set>
+#include <sstream>
 #include <stdexcept>
 #include <tuple>
 #include <utility>
@@ -267,15 +269,19 @@ void Describe(int num_views, int num_failed, const KrotUnits& units, KrotSolutio
   for (const auto& [frame, number] : solution.component) {
     num_components = std::max(num_components, number + 1);
   }
-  const auto px = [&](double gamma) {
-    const std::string text = std::to_string(gamma * units.focal_px);
-    return text.substr(0, text.find('.') + 4);
+  // Outwards, so that what is printed is a bracket, too.
+  const auto px = [&](double gamma, double (*round)(double)) {
+    std::ostringstream text;
+    text << std::fixed << std::setprecision(3) << round(1e3 * gamma * units.focal_px) / 1e3;
+    return text.str();
   };
+  const auto floor = [](double value) { return std::floor(value); };
+  const auto ceil = [](double value) { return std::ceil(value); };
   solution.message =
       std::to_string(num_placed) + " of " + std::to_string(num_views) + " views placed in " +
       std::to_string(num_components) + " component" + (num_components == 1 ? "" : "s") + ", " +
       std::to_string(solution.point_in_world.size()) + " points, largest residual in [" +
-      px(solution.gamma_low) + ", " + px(solution.gamma_high) + "] px over " +
+      px(solution.gamma_low, floor) + ", " + px(solution.gamma_high, ceil) + "] px over " +
       std::to_string(solution.num_bracket_observations) + " observations";
   if (num_failed > 0) {
     solution.message += "; " + std::to_string(num_failed) + " components gave no positions";
