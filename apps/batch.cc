@@ -254,7 +254,7 @@ void AddBatchCommand(CLI::App& app, Action& action) {
       "    name: kitti00                     # folder below --out; else the last part of path\n"
       "    command: run                      # or rotations\n"
       "    camera: calib.txt                 # else what lies with the images\n"
-      "    ground_truth: kitti/poses/00.txt  # else nothing to compare with\n"
+      "    ground_truth: kitti/poses/00.txt  # else what lies with the images\n"
       "    times: kitti/00/times.txt         # timestamps of a KITTI ground truth\n"
       "    rotations: gimbal.csv             # as --rotations of run\n"
       "    vocabulary: ORBvoc.txt            # as --vocabulary\n"

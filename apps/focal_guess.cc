@@ -62,7 +62,7 @@ std::optional<double> FocalFrom(const InputFlags& flags,
   part.camera = input.camera;
   const Orientations orientations =
       FindOrientations(part, options, nullptr, true, common, interruption, progress);
-  const char* const end = "interrupted in the first pass: nothing is written yet";
+  const char* const end = "interrupted while the focal length is sought: nothing is written yet";
   if (orientations.interrupted) throw InterruptedError(end);
   const LastWords last_words(interruption, [&] { progress.Warn(end); });
   const PositionResult positions =
@@ -131,8 +131,9 @@ void RefineGuess(const InputFlags& flags,
   FocalGuess& guess = *input.guess;
   for (int pass = 1; pass <= kMaxFirstPasses; ++pass) {
     const double before_px = guess.focal_px;
-    progress.Say("first pass, for the focal length: " + Pixels(before_px) +
-                 (pass == 1 ? " is a guess" : ", once more"));
+    progress.Say("pass " + std::to_string(pass) +
+                 " over the beginning, for the focal length: from " + Pixels(before_px) +
+                 (pass == 1 ? ", a guess" : ""));
     const std::optional<double> focal_px =
         FocalFrom(flags, common, FirstPass(options), input, interruption, progress);
     if (focal_px) {
@@ -142,8 +143,8 @@ void RefineGuess(const InputFlags& flags,
     if (std::abs(guess.focal_px - before_px) <= kFirstPassTolerance * before_px) break;
   }
   progress.Say(guess.focal_px != guess.guess_px
-                   ? "first pass: focal length " + Pixels(guess.focal_px) + "; now from the start"
-                   : std::string("first pass: nothing tells the focal length, the guess stands"));
+                   ? "focal length: " + Pixels(guess.focal_px) + "; now the sequence from its start"
+                   : std::string("focal length: nothing tells it, the guess stands"));
 }
 
 std::string WarningOf(const FocalGuess& guess, const Camera& refined) {

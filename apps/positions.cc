@@ -278,7 +278,8 @@ PositionResult FindPositions(const Orientations& orientations,
   const std::vector<Track>& tracks = result.keyframe_tracks;
   progress.EndStage(std::to_string(result.keyframes.size()) + " keyframes, " +
                     std::to_string(tracks.size()) + " tracks, " +
-                    std::to_string(result.held.size()) + " pure-rotation stretches");
+                    std::to_string(result.held.size()) + " pure-rotation stretch" +
+                    (result.held.size() == 1 ? "" : "es"));
   RotationMap keyframe_rotations;
   for (const FrameId frame : result.keyframes)
     keyframe_rotations[frame] = result.cam_from_world.at(frame);

@@ -39,6 +39,7 @@ int FindAndWriteRotations(const RotationsFlags& flags) {
   auto vocabulary = OpenVocabulary(flags.input);
   const std::filesystem::path directory = PrepareRunDirectory(flags.input.out);
   RefineGuess(flags.input, flags.common, options, interruption, progress, input);
+  const double guess_s = SecondsSince(start);
   Checkpoint checkpoint(directory,
                         flags.checkpoint,
                         IdentityOf("rotations", input, flags.input, options, flags.common.seed),
@@ -54,6 +55,7 @@ int FindAndWriteRotations(const RotationsFlags& flags) {
   const UnfinishedOutputs outputs(directory);
   WriteOrientations(outputs.folder(), orientations);
   RunSummary summary = StartSummary("rotations", input, orientations, DescribeOptions(options));
+  if (input.guess) summary.seconds.push_back({"focal_guess", guess_s});
   summary.seconds.push_back({"total", SecondsSince(start)});
   WriteSummary(outputs.folder() / "summary.json", summary);
   outputs.Publish();

@@ -32,6 +32,15 @@ struct RunFlags {
   bool use_report = true;
 };
 
+// The first frame on a part of the map, as segments.csv has it: what its first keyframes see may
+// still be held at the end of the part before.
+int FirstFrame(const std::vector<Segment>& segments, const MapComponent& part, int number) {
+  for (const Segment& segment : segments) {
+    if (segment.component == number) return segment.first_frame;
+  }
+  return part.keyframes.begin()->value;
+}
+
 int Run(const RunFlags& flags) {
   const Clock::time_point start = Clock::now();
   Interruption interruption;
@@ -44,6 +53,7 @@ int Run(const RunFlags& flags) {
   auto vocabulary = OpenVocabulary(flags.input);
   const std::filesystem::path directory = PrepareRunDirectory(flags.input.out);
   RefineGuess(flags.input, flags.common, options, interruption, progress, input);
+  const double guess_s = SecondsSince(start);
   Checkpoint checkpoint(directory,
                         flags.checkpoint,
                         IdentityOf("run", input, flags.input, options, flags.common.seed),
@@ -59,10 +69,11 @@ int Run(const RunFlags& flags) {
                                                      &checkpoint);
   const UnfinishedOutputs outputs(directory);
   WriteOrientations(outputs.folder(), orientations);
-  const double orientations_s = SecondsSince(start);
+  const double orientations_s = SecondsSince(start) - guess_s;
   const auto end_early = [&] {
     RunSummary summary = StartSummary("run", input, orientations, DescribeOptions(options));
     summary.interrupted = true;
+    if (input.guess) summary.seconds.push_back({"focal_guess", guess_s});
     summary.seconds.push_back({"orientations", orientations_s});
     summary.seconds.push_back({"total", SecondsSince(start)});
     WriteSummary(outputs.folder() / "summary.json", summary);
@@ -78,7 +89,7 @@ int Run(const RunFlags& flags) {
     const LastWords last_words(interruption, end_early);
     return FindPositions(orientations, input.camera, options, flags.common.NumThreads(), progress);
   }();
-  const double positions_s = SecondsSince(start) - orientations_s;
+  const double positions_s = SecondsSince(start) - orientations_s - guess_s;
   WritePositions(outputs.folder(),
                  orientations,
                  positions,
@@ -96,15 +107,16 @@ int Run(const RunFlags& flags) {
                            {"refined_px", positions.camera.MeanFocal()}};
   }
   if (input.guess) summary.calibration = SummaryOf(*input.guess, positions.camera);
+  if (input.guess) summary.seconds.push_back({"focal_guess", guess_s});
   summary.seconds.push_back({"orientations", orientations_s});
   summary.seconds.push_back({"positions", positions_s});
   summary.seconds.push_back({"total", SecondsSince(start)});
   WriteSummary(outputs.folder() / "summary.json", summary);
   outputs.Publish();
 
-  for (std::size_t k = 1; k < positions.components.size(); ++k) {
+  for (int k = 1; k < std::ssize(positions.components); ++k) {
     progress.Warn("no tracks tie the scale of the map from frame " +
-                  std::to_string(positions.components[k].keyframes.begin()->value) +
+                  std::to_string(FirstFrame(*summary.segments, positions.components[k], k)) +
                   " on to the part before; it is set so that the speed is continuous");
   }
   if (input.guess) progress.Warn(WarningOf(*input.guess, positions.camera));

@@ -155,7 +155,7 @@ void AddSimulateCommand(CLI::App& app, Action& action) {
   command->add_option("--distractors", simulation.distractors, "Boxes moving through the scene");
   command->add_flag("--color", render.color, "Colour instead of grey pictures");
   AddCommonFlags(*command, flags->common);
-  command->footer("Example: rotslam simulate gimbal --out runs/gimbal");
+  command->footer("Example: rotslam simulate gimbal --out sequences/gimbal");
   command->callback([flags, &action] { action = [flags] { return Simulate(*flags); }; });
 }
 

@@ -82,8 +82,8 @@ class Rounds {
   void Run(const std::string& name, const BundleRound& round, BundleState& state) {
     if (!good_ || !round.enabled) return;
     const auto start = std::chrono::steady_clock::now();
-    max_error_px_ = round.max_error_px;
-    ClassifyAll(round.max_error_px, /*retriangulate=*/true, options_, state);
+    last_ = &round;
+    ClassifyAll(round, /*retriangulate=*/true, options_, state);
     const ResidualStatistics before = Statistics(state);
     const bool is_first = result_.summary.rounds.empty();
     Minimise(name, round, start, state);
@@ -101,7 +101,7 @@ class Rounds {
       if (!good_ || !round.enabled) return;
       const auto start = std::chrono::steady_clock::now();
       const std::vector<bool> before = UsedFlags(state);
-      ClassifyAll(round.max_error_px, /*retriangulate=*/true, options_, state);
+      ClassifyAll(round, /*retriangulate=*/true, options_, state);
       const std::vector<bool> after = UsedFlags(state);
       std::size_t changed = 0;
       for (std::size_t o = 0; o < after.size(); ++o) changed += before[o] != after[o] ? 1 : 0;
@@ -139,7 +139,7 @@ class Rounds {
   }
 
   bool good() const { return good_; }
-  double max_error_px() const { return max_error_px_; }  // of the last round
+  const BundleRound& last() const { return *last_; }
 
  private:
   LensSigmas SigmasOf(const Eigen::Matrix<double, 6, 6>& covariance) const {
@@ -198,7 +198,7 @@ class Rounds {
   BundleResult& result_;
   bool good_ = true;
   bool refine_lens_ = false;
-  double max_error_px_ = 0.0;
+  const BundleRound* last_ = nullptr;
 };
 
 // Poses and well-fitting tracks of `state`.
@@ -284,7 +284,7 @@ BundleResult RefineBundle(const BundleProblem& problem, const BundleOptions& opt
     summary.final_cost = summary.rounds.back().final_cost;
   }
   if (rounds.good()) {
-    ClassifyAll(rounds.max_error_px(), /*retriangulate=*/false, options, state);
+    ClassifyAll(rounds.last(), /*retriangulate=*/false, options, state);
     summary.after = Statistics(state);
     rounds.FindCovariances(options.fine, state);
     TakeResult(problem, state, result);
@@ -299,7 +299,7 @@ BundleResult RefineBundle(const BundleProblem& problem, const BundleOptions& opt
 
 Reconstruction TriangulateTracks(const BundleProblem& problem, const BundleOptions& options) {
   BundleState state = MakeBundleState(problem, options);
-  ClassifyAll(options.fine.max_error_px, /*retriangulate=*/true, options, state);
+  ClassifyAll(options.fine, /*retriangulate=*/true, options, state);
   BundleResult result;
   TakeResult(problem, state, result);
   result.reconstruction.center_in_world = problem.start.center_in_world;

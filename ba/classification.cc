@@ -1,11 +1,17 @@
 #include "ba/classification.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <limits>
+#include <memory>
 #include <optional>
 #include <utility>
 
+#include <Eigen/Cholesky>
+
+#include "ba/loss.h"
+#include "ba/reprojection_cost.h"
 #include "rotodom/types/parallel.h"
 #include "rotodom/types/triangulation.h"
 
@@ -15,6 +21,9 @@ namespace {
 constexpr double kInfinity = std::numeric_limits<double>::infinity();
 // Two-view hypotheses for a track in which not all observations agree.
 constexpr int kMaxTrackHypotheses = 20;
+// Gauss-Newton steps of a point, and the share of its cost that is worth another.
+constexpr int kMaxSteps = 10;
+constexpr double kLeastGain = 1e-4;
 
 Sighting AsSighting(const BundleState& state, const Sight& sight, double focal_px) {
   const FrameState& frame = state.frames[sight.frame];
@@ -41,47 +50,32 @@ double ErrorPx(const BundleState& state,
 struct Verdict {
   std::vector<bool> fits;
   int num_fits = 0;
-  double score = kInfinity;  // sum of squared errors in sigmas, each cut off at the limit
+  // Cost over all of them, each error cut off at the limit. Minimisation, which moves what fits,
+  // lowers the same sum: one round after the other comes to rest.
+  double score = kInfinity;
 };
 
 class Classifier {
  public:
-  // @param max_error_px  zero: whatever projects fits.
-  Classifier(const BundleState& state, double max_error_px, const BundleOptions& options)
+  Classifier(const BundleState& state, const BundleRound& round, const BundleOptions& options)
       : state_(state),
-        max_error_px_(max_error_px),
+        max_error_px_(round.max_error_px),
+        loss_(MakeLoss(round)),
         min_observations_(options.min_observations),
         min_angle_rad_(options.min_angle_deg * kRadFromDeg) {}
 
   // Marks the observations that the track's position, or else a new one, explains.
   void Classify(TrackState& track) const {
-    bool found = false;
-    Eigen::Vector3d best = Eigen::Vector3d::Zero();
-    Verdict best_verdict;
-    const auto offer = [&](const std::optional<Eigen::Vector3d>& position) {
-      if (!position || !position->allFinite()) return;
-      Verdict verdict = Judge(track, *position);
-      if (found && !(verdict.score < best_verdict.score)) return;
-      found = true;
-      best = *position;
-      best_verdict = std::move(verdict);
-    };
-    const int num_sights = static_cast<int>(track.sights.size());
-    const auto all_fit = [&] { return found && best_verdict.num_fits == num_sights; };
-    if (track.has_position) offer(track.position);
-    if (!all_fit()) offer(Locate(track, std::vector<bool>(num_sights, true)));
-    if (!all_fit() && (max_error_px_ > 0.0 || !found)) {
-      for (const auto& [a, b] : Pairs(num_sights)) {
-        std::vector<bool> chosen(num_sights, false);
-        chosen[a] = chosen[b] = true;
-        offer(Locate(track, chosen));
-        if (all_fit()) break;
-      }
-      if (found && best_verdict.num_fits >= 2) offer(Locate(track, best_verdict.fits));
+    Best best;
+    if (track.has_position) Offer(track, track.position, best);
+    if (best.num_misfits > 0) {
+      Search(track, best);
+      Settle(track, best);
     }
-    track.has_position = found;
-    if (found) track.position = best;
-    Accept(track, found ? best_verdict.fits : std::vector<bool>(num_sights, false));
+    track.has_position = best.position.has_value();
+    if (best.position) track.position = *best.position;
+    best.verdict.fits.resize(track.sights.size(), false);
+    Accept(track, best.verdict.fits);
   }
 
   // The same with the position as it is.
@@ -107,6 +101,49 @@ class Classifier {
   }
 
  private:
+  // The cheapest position so far.
+  struct Best {
+    std::optional<Eigen::Vector3d> position;
+    Verdict verdict;
+    int num_misfits = std::numeric_limits<int>::max();
+  };
+
+  void Offer(const TrackState& track,
+             const std::optional<Eigen::Vector3d>& position,
+             Best& best) const {
+    if (!position || !position->allFinite()) return;
+    Verdict verdict = Judge(track, *position);
+    if (best.position && !(verdict.score < best.verdict.score)) return;
+    best.position = position;
+    best.num_misfits = static_cast<int>(track.sights.size()) - verdict.num_fits;
+    best.verdict = std::move(verdict);
+  }
+
+  // From all observations, from pairs, and from those that fit.
+  void Search(const TrackState& track, Best& best) const {
+    const int num_sights = static_cast<int>(track.sights.size());
+    Offer(track, Locate(track, std::vector<bool>(num_sights, true)), best);
+    if (best.num_misfits == 0 || (max_error_px_ == 0.0 && best.position)) return;
+    for (const auto& [a, b] : Pairs(num_sights)) {
+      std::vector<bool> chosen(num_sights, false);
+      chosen[a] = chosen[b] = true;
+      Offer(track, Locate(track, chosen), best);
+      if (best.num_misfits == 0) break;
+    }
+    if (best.verdict.num_fits >= 2) Offer(track, Locate(track, best.verdict.fits), best);
+  }
+
+  // On to the smallest cost. Cameras would otherwise be moved by, and observations judged at,
+  // points that minimisation takes elsewhere.
+  void Settle(const TrackState& track, Best& best) const {
+    if (track.one_place) return;
+    for (int k = 0; k < kMaxSteps && best.position; ++k) {
+      const double before = best.verdict.score;
+      Offer(track, Step(track, *best.position, best.verdict.fits), best);
+      if (!(best.verdict.score < (1.0 - kLeastGain) * before)) return;
+    }
+  }
+
   double LimitPx(const Sight& sight) const {
     if (max_error_px_ == 0.0) return std::numeric_limits<double>::max();
     return max_error_px_ * std::max(1.0, sight.observation->sigma_px);
@@ -121,9 +158,17 @@ class Classifier {
       verdict.fits.push_back(error_px <= limit_px);
       verdict.num_fits += verdict.fits.back() ? 1 : 0;
       const double sigmas = std::min(error_px, limit_px) / sight.observation->sigma_px;
-      verdict.score += sigmas * sigmas;
+      verdict.score += Loss(sigmas * sigmas)[0];
     }
     return verdict;
+  }
+
+  // The loss of a squared residual in sigmas, and its first two derivatives.
+  std::array<double, 3> Loss(double square) const {
+    if (!loss_) return {square, 1.0, 0.0};
+    std::array<double, 3> loss;
+    loss_->Evaluate(square, loss.data());
+    return loss;
   }
 
   std::optional<Eigen::Vector3d> Locate(const TrackState& track,
@@ -147,6 +192,32 @@ class Classifier {
     }
     if (sightings.size() < 2) return std::nullopt;
     return Triangulate(sightings, min_angle_rad_);
+  }
+
+  // A Gauss-Newton step towards the smallest cost of the chosen observations.
+  std::optional<Eigen::Vector3d> Step(const TrackState& track,
+                                      const Eigen::Vector3d& position,
+                                      const std::vector<bool>& chosen) const {
+    Eigen::Matrix3d H = Eigen::Matrix3d::Zero();
+    Eigen::Vector3d g = Eigen::Vector3d::Zero();
+    for (std::size_t k = 0; k < chosen.size(); ++k) {
+      if (!chosen[k]) continue;
+      const Sight& sight = track.sights[k];
+      const FrameState& frame = state_.frames[sight.frame];
+      ReprojectionJacobian J;
+      const std::optional<Eigen::Vector2d> pixel = Reproject(
+          state_.camera, frame.cam_from_world.Matrix(), state_.centers[frame.center], position, &J);
+      if (!pixel) continue;
+      const Eigen::Vector2d residual =
+          (*pixel - sight.observation->keypoint_px) / sight.observation->sigma_px;
+      const double weight = Loss(residual.squaredNorm())[1];
+      const Eigen::Matrix<double, 2, 3> J_point = J.by_point / sight.observation->sigma_px;
+      H.noalias() += weight * J_point.transpose() * J_point;
+      g.noalias() += weight * J_point.transpose() * residual;
+    }
+    const Eigen::LDLT<Eigen::Matrix3d> factor(H);
+    if (factor.info() != Eigen::Success || !factor.isPositive()) return std::nullopt;
+    return position - factor.solve(g);
   }
 
   // Pairs of sights, widest apart first.
@@ -180,7 +251,8 @@ class Classifier {
   }
 
   const BundleState& state_;
-  double max_error_px_;
+  double max_error_px_;  // zero: whatever projects fits
+  std::unique_ptr<ceres::LossFunction> loss_;
   int min_observations_;
   double min_angle_rad_;
 };
@@ -212,11 +284,11 @@ void RemoveWeakFrames(const Classifier& classifier, int min_observations, Bundle
 
 }  // namespace
 
-void ClassifyAll(double max_error_px,
+void ClassifyAll(const BundleRound& round,
                  bool retriangulate,
                  const BundleOptions& options,
                  BundleState& state) {
-  const Classifier classifier(state, max_error_px, options);
+  const Classifier classifier(state, round, options);
   if (retriangulate) {
     for (FrameState& frame : state.frames) frame.weak = false;
   }

@@ -6,9 +6,9 @@ namespace rotslam {
 
 /// Decides which observations fit, the cameras standing where they stand, and which tracks make a
 /// point or a direction; frames left with too few observations become weak.
-/// @param max_error_px   largest reprojection error of what fits; zero: whatever projects fits.
+/// @param round          its limit, and its loss, by which positions are compared.
 /// @param retriangulate  look for each track's position anew; else it is judged where it is.
-void ClassifyAll(double max_error_px,
+void ClassifyAll(const BundleRound& round,
                  bool retriangulate,
                  const BundleOptions& options,
                  BundleState& state);

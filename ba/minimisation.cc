@@ -5,12 +5,12 @@
 #include <memory>
 #include <vector>
 
-#include <ceres/loss_function.h>
 #include <ceres/ordered_groups.h>
 #include <ceres/problem.h>
 #include <ceres/sphere_manifold.h>
 
 #include "ba/lens.h"
+#include "ba/loss.h"
 #include "ba/marginal_covariance.h"
 #include "ba/pose_manifold.h"
 #include "ba/reprojection_cost.h"
@@ -26,12 +26,6 @@ constexpr double kHeldSigma = 1e-7;
 // Keeps Levenberg-Marquardt's damping above rounding, for what the data leave open: the length of
 // directions, scale and place of parts that share no track.
 constexpr double kMaxTrustRegionRadius = 1e10;
-
-std::unique_ptr<ceres::LossFunction> MakeLoss(const BundleRound& round) {
-  if (round.loss == "huber") return std::make_unique<ceres::HuberLoss>(round.loss_scale);
-  if (round.loss == "cauchy") return std::make_unique<ceres::CauchyLoss>(round.loss_scale);
-  return nullptr;
-}
 
 // Whether some frames stand at one place.
 bool SharesCenters(const BundleState& state) {

@@ -2,31 +2,19 @@
 
 #include <algorithm>
 #include <cstddef>
+#include <iterator>
 #include <set>
 #include <utility>
 
+#include "krot/blocks.h"
 #include "krot/growth.h"
 #include "krot/linear_start.h"
 #include "krot/named_problem.h"
+#include "krot/robust_triangulation.h"
 #include "krot/selection.h"
 
 namespace rotslam {
 namespace {
-
-// Tracks cut to the observations that fulfil `keep`; those left with fewer than two are dropped.
-template <class Keep>
-std::vector<Track> Restricted(const std::vector<Track>& tracks, const Keep& keep) {
-  std::vector<Track> result;
-  for (const Track& track : tracks) {
-    Track part;
-    part.id = track.id;
-    for (const Observation& observation : track.observations) {
-      if (keep(observation)) part.observations.push_back(observation);
-    }
-    if (part.observations.size() >= 2) result.push_back(std::move(part));
-  }
-  return result;
-}
 
 // The observations of `problem` with residual at most `limit`, without points then seen once. Every
 // view stays, so the gauge does.
@@ -78,6 +66,96 @@ std::optional<ComponentStart> SolvePrograms(const RotationMap& cam_from_world,
   return start;
 }
 
+// The tracks that at least two of the views see in front of them, as they see them.
+std::vector<Track> TracksOf(const std::set<FrameId>& views,
+                            const std::vector<Track>& tracks,
+                            double min_z) {
+  return RestrictTracks(tracks, [&](const Observation& observation) {
+    return views.contains(observation.frame) && observation.bearing.z() >= min_z;
+  });
+}
+
+// The views, in the order of time, cut into pieces that overlap by a quarter.
+std::vector<std::set<FrameId>> Overlapping(const ViewComponent& component, std::size_t size) {
+  std::vector<FrameId> views = component.views;
+  std::sort(views.begin(), views.end());
+  const std::size_t step = size - size / 4;
+  std::vector<std::set<FrameId>> pieces;
+  for (std::size_t first = 0;; first += step) {
+    // The last piece is as long as the others.
+    const std::size_t begin = std::min(first, views.size() - std::min(size, views.size()));
+    const auto from = views.begin() + static_cast<std::ptrdiff_t>(begin);
+    pieces.emplace_back(from, from + static_cast<std::ptrdiff_t>(std::min(size, views.size())));
+    if (begin + size >= views.size()) return pieces;
+  }
+}
+
+// What the programs' positions bear out: views that are tied by tracks that fit, each part a block.
+// A few chance matches can have tied more.
+std::vector<Block> FittingBlocks(const RotationMap& cam_from_world,
+                                 const std::vector<Track>& tracks,
+                                 const CenterMap& centers,
+                                 const ComponentOptions& options,
+                                 const KrotUnits& units) {
+  std::vector<Track> fitting;
+  std::vector<Eigen::Vector3d> points;
+  for (const Track& track : tracks) {
+    std::vector<int> observations;
+    const auto point = TriangulateRobustly(
+        PlacedSightings(cam_from_world, centers, track, /*focal_px=*/1.0, &observations),
+        units.lp_parallax_rad,
+        units.loose_rad);
+    if (!point) continue;
+    points.push_back(point->point_in_world);
+    fitting.emplace_back().id = track.id;
+    for (const int inlier : point->inliers) {
+      fitting.back().observations.push_back(track.observations[observations[inlier]]);
+    }
+  }
+  std::vector<Block> blocks;
+  for (const ViewComponent& part : FindComponents(cam_from_world, fitting, options)) {
+    Block& block = blocks.emplace_back();
+    for (const FrameId view : part.views) block.centers[view] = centers.at(view);
+    for (std::size_t t = 0; t < fitting.size(); ++t) {
+      if (!block.centers.contains(fitting[t].observations.front().frame)) continue;
+      block.points[fitting[t].id] = points[t];
+    }
+  }
+  return blocks;
+}
+
+// Programs over pieces of a component, whose time grows with its length only, joined by what the
+// pieces share.
+std::optional<ComponentStart> SolveInBlocks(const RotationMap& cam_from_world,
+                                            const std::vector<Track>& tracks,
+                                            const ViewComponent& component,
+                                            const KrotOptions& options,
+                                            const KrotUnits& units) {
+  ComponentOptions component_options;
+  component_options.min_shared_points = options.min_shared_points;
+  component_options.min_parallax_rad = units.still_rad;
+  ComponentStart start;
+  std::vector<Block> blocks;
+  for (const std::set<FrameId>& piece :
+       Overlapping(component, static_cast<std::size_t>(options.max_lp_views))) {
+    const auto piece_tracks = TracksOf(piece, tracks, units.min_z);
+    for (const ViewComponent& part :
+         FindComponents(cam_from_world, piece_tracks, component_options)) {
+      const std::set<FrameId> views(part.views.begin(), part.views.end());
+      const auto part_tracks = TracksOf(views, piece_tracks, units.min_z);
+      const auto solved = SolvePrograms(cam_from_world, part_tracks, options, units);
+      if (!solved) continue;
+      start.num_programs += solved->num_programs;
+      std::ranges::move(
+          FittingBlocks(cam_from_world, part_tracks, solved->centers, component_options, units),
+          std::back_inserter(blocks));
+    }
+  }
+  start.centers = BlendBlocks(blocks, JoinBlocks(blocks));
+  if (start.centers.size() < 2) return std::nullopt;
+  return start;
+}
+
 }  // namespace
 
 std::optional<ComponentStart> StartComponent(const RotationMap& cam_from_world,
@@ -85,22 +163,18 @@ std::optional<ComponentStart> StartComponent(const RotationMap& cam_from_world,
                                              const ViewComponent& component,
                                              const KrotOptions& options,
                                              const KrotUnits& units) {
-  const std::size_t num_lp_views =
-      std::min(component.views.size(), static_cast<std::size_t>(options.max_lp_views));
-  const std::set<FrameId> lp_views(
-      component.views.begin(), component.views.begin() + static_cast<std::ptrdiff_t>(num_lp_views));
-  const auto lp_tracks = Restricted(tracks, [&](const Observation& observation) {
-    return lp_views.contains(observation.frame) && observation.bearing.z() >= units.min_z;
-  });
-  std::optional<ComponentStart> start = SolvePrograms(cam_from_world, lp_tracks, options, units);
+  const std::set<FrameId> members(component.views.begin(), component.views.end());
+  std::optional<ComponentStart> start =
+      component.views.size() <= static_cast<std::size_t>(options.max_lp_views)
+          ? SolvePrograms(cam_from_world, TracksOf(members, tracks, units.min_z), options, units)
+          : SolveInBlocks(cam_from_world, tracks, component, options, units);
   if (!start || start->centers.size() == component.views.size()) return start;
   GrowthOptions growth;
   growth.resection.threshold_rad = units.loose_rad;
   growth.resection.seed = options.seed;
   growth.min_angle_rad = units.lp_parallax_rad;
   growth.threshold_rad = units.loose_rad;
-  const std::set<FrameId> members(component.views.begin(), component.views.end());
-  const auto member_tracks = Restricted(
+  const auto member_tracks = RestrictTracks(
       tracks, [&](const Observation& observation) { return members.contains(observation.frame); });
   const std::size_t before = start->centers.size();
   PlaceViews(cam_from_world, member_tracks, component.views, growth, start->centers);

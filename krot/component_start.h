@@ -17,9 +17,9 @@ struct ComponentStart {
   int num_grown_views = 0;  // placed by resection
 };
 
-/// Solves the robust start's programs over a spread of tracks and places the views that they leave
-/// out, by resection. With options.start "linear" SolveLinearStart has the last word over what the
-/// programs kept.
+/// Solves the robust start's programs over a spread of tracks, in blocks of views where there are
+/// more than options.max_lp_views, and places the views that they leave out, by resection. With
+/// options.start "linear" SolveLinearStart has the last word over what the programs kept.
 /// @param tracks  clean: finite unit bearings, frames ascending.
 /// @return  nullopt when the programs give no structure.
 std::optional<ComponentStart> StartComponent(const RotationMap& cam_from_world,

@@ -3,7 +3,9 @@
 #include <algorithm>
 #include <chrono>
 #include <cmath>
+#include <iomanip>
 #include <set>
+#include <sstream>
 #include <stdexcept>
 #include <tuple>
 #include <utility>
@@ -13,6 +15,7 @@
 #include "krot/epipolar_filter.h"
 #include "krot/minimax_problem.h"
 #include "krot/named_problem.h"
+#include "krot/selection.h"
 #include "krot/track_points.h"
 #include "rotodom/types/median.h"
 #include "rotodom/types/stopwatch.h"
@@ -239,21 +242,46 @@ std::optional<BisectionStatus> SolveComponent(const RotationMap& cam_from_world,
   return bracket;
 }
 
+// What hangs together among the component's views that got no position. A few chance matches can
+// have tied two places into one component: the one behind the bridge stands for itself then.
+std::vector<ViewComponent> LeftBehind(const RotationMap& cam_from_world,
+                                      const std::vector<Track>& tracks,
+                                      const ViewComponent& component,
+                                      const ComponentOptions& options,
+                                      const KrotSolution& solution) {
+  // Fewer are views of the same place that their own matches leave open.
+  constexpr std::size_t kMinViews = 10;
+  std::set<FrameId> left;
+  for (const FrameId view : component.views) {
+    if (!solution.center_in_world.contains(view)) left.insert(view);
+  }
+  if (left.size() < kMinViews) return {};
+  const auto their_tracks = RestrictTracks(
+      tracks, [&](const Observation& observation) { return left.contains(observation.frame); });
+  std::vector<ViewComponent> parts = FindComponents(cam_from_world, their_tracks, options);
+  std::erase_if(parts, [](const ViewComponent& part) { return part.views.size() < kMinViews; });
+  return parts;
+}
+
 void Describe(int num_views, int num_failed, const KrotUnits& units, KrotSolution& solution) {
   const int num_placed = static_cast<int>(solution.center_in_world.size());
   int num_components = 0;
   for (const auto& [frame, number] : solution.component) {
     num_components = std::max(num_components, number + 1);
   }
-  const auto px = [&](double gamma) {
-    const std::string text = std::to_string(gamma * units.focal_px);
-    return text.substr(0, text.find('.') + 4);
+  // Outwards, so that what is printed is a bracket, too.
+  const auto px = [&](double gamma, double (*round)(double)) {
+    std::ostringstream text;
+    text << std::fixed << std::setprecision(3) << round(1e3 * gamma * units.focal_px) / 1e3;
+    return text.str();
   };
+  const auto floor = [](double value) { return std::floor(value); };
+  const auto ceil = [](double value) { return std::ceil(value); };
   solution.message =
       std::to_string(num_placed) + " of " + std::to_string(num_views) + " views placed in " +
       std::to_string(num_components) + " component" + (num_components == 1 ? "" : "s") + ", " +
       std::to_string(solution.point_in_world.size()) + " points, largest residual in [" +
-      px(solution.gamma_low) + ", " + px(solution.gamma_high) + "] px over " +
+      px(solution.gamma_low, floor) + ", " + px(solution.gamma_high, ceil) + "] px over " +
       std::to_string(solution.num_bracket_observations) + " observations";
   if (num_failed > 0) {
     solution.message += "; " + std::to_string(num_failed) + " components gave no positions";
@@ -295,7 +323,7 @@ void Solve(const RotationMap& cam_from_world,
   ComponentOptions component_options;
   component_options.min_shared_points = options.min_shared_points;
   component_options.min_parallax_rad = units.still_rad;
-  const auto components = FindComponents(cam_from_world, tracks, component_options);
+  std::vector<ViewComponent> components = FindComponents(cam_from_world, tracks, component_options);
   if (components.empty()) {
     solution.message =
         "no two views share " + std::to_string(options.min_shared_points) + " tracks with parallax";
@@ -304,12 +332,18 @@ void Solve(const RotationMap& cam_from_world,
   int num_failed = 0;
   bool all_converged = true;
   bool cancelled = false;
-  for (const ViewComponent& component : components) {
+  for (std::size_t k = 0; k < components.size(); ++k) {
+    const ViewComponent component = components[k];
     const auto bracket =
         SolveComponent(cam_from_world, tracks, thresholds, component, options, units, solution);
-    if (!bracket) ++num_failed;
     all_converged = all_converged && bracket == BisectionStatus::kConverged;
     cancelled = cancelled || bracket == BisectionStatus::kCancelled;
+    if (!bracket) {
+      ++num_failed;
+      continue;
+    }
+    const auto left = LeftBehind(cam_from_world, tracks, component, component_options, solution);
+    components.insert(components.end(), left.begin(), left.end());
   }
   if (solution.center_in_world.empty()) {
     solution.status = KrotStatus::kSolverFailed;

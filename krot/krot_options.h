@@ -33,9 +33,9 @@ struct KrotOptions {
   // unless `start` needs the bracket: positions do not gain by it, and its time grows faster than
   // the sequence (docs/performance.md).
   int max_bracket_views = 1000;
-  // Views that go into the start's programs. Components with more start from this many and grow
-  // view by view from there.
-  int max_lp_views = 1000;
+  // Views that go into the start's programs together. Components with more are solved in blocks of
+  // so many, which overlap by a quarter and are joined by what they share (JoinBlocks).
+  int max_lp_views = 250;
   // Observations per view in the start's programs.
   int observations_per_view = 40;
   // Tracks under this parallax come into the linear programs last, for the sake of conditioning.

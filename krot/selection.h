@@ -1,5 +1,6 @@
 #pragma once
 
+#include <utility>
 #include <vector>
 
 #include "rotodom/types/maps.h"
@@ -24,5 +25,20 @@ struct SelectionOptions {
 std::vector<int> SelectTracks(const RotationMap& cam_from_world,
                               const std::vector<Track>& tracks,
                               const SelectionOptions& options);
+
+/// Tracks cut to the observations that fulfil `keep`; those left with fewer than two are dropped.
+template <class Keep>
+std::vector<Track> RestrictTracks(const std::vector<Track>& tracks, const Keep& keep) {
+  std::vector<Track> result;
+  for (const Track& track : tracks) {
+    Track part;
+    part.id = track.id;
+    for (const Observation& observation : track.observations) {
+      if (keep(observation)) part.observations.push_back(observation);
+    }
+    if (part.observations.size() >= 2) result.push_back(std::move(part));
+  }
+  return result;
+}
 
 }  // namespace rotslam

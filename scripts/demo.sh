@@ -33,3 +33,5 @@ echo "accuracy against the exact truth:"
 echo
 echo "written:"
 printf '%s\n' "$PWD/$result"/*
+echo
+echo "to look at it, open in a browser: $PWD/$result/report.html"

@@ -42,7 +42,7 @@ struct BatchEntry {
 ///     name: kitti00                    # letters, digits, . _ -; left out: the last part of path
 ///     command: rotations               # left out: run
 ///     camera: calib.txt                # left out: the calibration that lies with the images
-///     ground_truth: kitti/poses/00.txt # left out: nothing to compare with
+///     ground_truth: kitti/poses/00.txt # left out: what lies with the images
 ///     times: kitti/00/times.txt        # timestamps of a KITTI ground truth
 ///     rotations: gimbal.csv            # as --rotations; only for run
 ///     vocabulary: ORBvoc.txt           # as --vocabulary

@@ -11,6 +11,7 @@
 #include "output/atomic_file.h"
 #include "output/option_list.h"
 #include "output/summary.h"
+#include "rotodom/sequence/layout.h"
 
 namespace rotslam {
 namespace {
@@ -58,11 +59,22 @@ void AddMetrics(const BatchEntry& entry,
                 BatchResult& result) {
   MetricsOptions options;
   options.num_threads = num_threads;
-  std::optional<fs::path> times;
-  if (!entry.times.empty()) times = entry.times;
   try {
+    const std::optional<fs::path> truth =
+        entry.ground_truth.empty()
+            ? FindLayout(entry.path, entry.options.sequence.fps).ground_truth_file
+            : std::optional<fs::path>(entry.ground_truth);
+    if (!truth) return;
+    // Of a KITTI file, as `rotslam report` takes them.
+    std::optional<fs::path> times;
+    const fs::path beside = truth->parent_path() / "times.txt";
+    if (!entry.times.empty()) {
+      times = entry.times;
+    } else if (fs::exists(beside)) {
+      times = beside;
+    }
     const TrajectoryMetrics metrics =
-        CompareTrajectoryFiles(entry.ground_truth, EstimateOf(entry, directory), times, options);
+        CompareTrajectoryFiles(*truth, EstimateOf(entry, directory), times, options);
     result.coverage = Coverage(metrics, static_cast<int>(result.frames.value_or(0)));
     result.rpe1_deg = metrics.rpe1_deg;
     result.rpen_deg = metrics.rpen_deg;
@@ -194,7 +206,7 @@ BatchResult ResultOf(const BatchEntry& entry,
   if (fs::exists(directory / kReportFile)) result.report = entry.name + "/" + kReportFile;
   result.frames = Count(*summary, "frames");
   result.points = Count(*summary, "points");
-  if (!entry.ground_truth.empty()) AddMetrics(entry, directory, num_threads, result);
+  AddMetrics(entry, directory, num_threads, result);
   return result;
 }
 

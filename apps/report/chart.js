@@ -290,7 +290,7 @@ class Chart {
       height: this.plotHeight() + 'px'});
     this.series.forEach((item, k) => {
       const index = item.at ? item.at[current] : current;
-      let text = item.name + ' ' + (index < 0 ? '–' : item.values[index].toFixed(this.decimals));
+      let text = item.name + ' ' + (index < 0 ? '–' : fixed(item.values[index], this.decimals));
       if (index >= 0 && item.band) text += item.band[index] >= 0 ? ' ± ' + significant(item.band[index], 2) : '';
       this.values[k].value.textContent = text;
     });

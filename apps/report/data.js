@@ -81,8 +81,9 @@ function significant(value, digits) {
   return String(Number(value.toPrecision(digits)));
 }
 
+// With so many decimals; what rounds to nothing has no sign.
 function fixed(value, decimals) {
-  return value === null || value === undefined ? '–' : value.toFixed(decimals);
+  return value === null || value === undefined ? '–' : value.toFixed(decimals).replace(/^-(?=[0.]*$)/, '');
 }
 
 function whole(value) {

@@ -300,7 +300,8 @@ Drawing RuntimeFigure(const RunData& run) {
     drawing.AddText(
         {kNameWidth - 6.0, y + 10.0}, name, {TextAnchor::kEnd, 9.0, false, false, kInk});
     const double length = std::max(0.5, (kWidth - kNameWidth - 60.0) * seconds / longest);
-    const bool is_whole = name == "total" || name == "orientations" || name == "positions";
+    const bool is_whole =
+        name == "total" || name == "focal guess" || name == "orientations" || name == "positions";
     Color color = kBlue;
     if (!is_whole) color.opacity = 0.55;
     drawing.AddArea({{kNameWidth, y + 2.0},

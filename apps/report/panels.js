@@ -222,7 +222,9 @@ function drawBracket(canvas, low, high) {
   context.fillStyle = color('muted');
   context.textAlign = 'center';
   context.fillText('impossible', x(0.5 * low), 16);
-  context.fillText(fixed(low, 3) + ' … ' + fixed(high, 3) + ' px', Math.min(width - 60, x(0.5 * (low + high))), 16);
+  // Outwards, as the message has them.
+  const [down, up] = [Math.floor(1e3 * low) / 1e3, Math.ceil(1e3 * high) / 1e3];
+  context.fillText(fixed(down, 3) + ' … ' + fixed(up, 3) + ' px', Math.min(width - 60, x(0.5 * (low + high))), 16);
   const scale = ticks(0, most, width / 70);
   for (const value of scale.list) context.fillText(value.toFixed(scale.decimals), Math.min(width - 12, x(value)), 54);
 }
@@ -264,7 +266,7 @@ function buildFigures(parent) {
   list('Camera', summary.camera);
 }
 
-const kStages = [['orientations', ['pyramid', 'tracking', 'detection', 'edges', 'averaging', 'covariance', 'loop_description',
+const kStages = [['focal_guess', []], ['orientations', ['pyramid', 'tracking', 'detection', 'edges', 'averaging', 'covariance', 'loop_description',
   'loop_candidates', 'loop_verification', 'global_averaging']],
 ['positions', ['known_rotation', 'bundle_adjustment', 'bundle_bridge', 'bundle_coarse', 'bundle_fine', 'bundle_lens']]];
 

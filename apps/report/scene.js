@@ -51,6 +51,7 @@ class Scene {
     const step = Math.max(1, Math.floor(numFrames / 500));
     for (let k = 0; k < numFrames; k += step) add(...this.path.slice(3 * k, 3 * k + 3));
     if (!hasPositions) for (const s of [-1, 1]) points.push(new THREE.Vector3(s, s, s));
+    this.numPathPoints = points.length;
     const path = new THREE.Box3().setFromPoints(points);
     if (hasPositions && cloud && cloud.position.length > 0) {
       const sample = [];
@@ -294,12 +295,14 @@ class Scene {
     const tangent = Math.tan(0.5 * this.camera.fov * Math.PI / 180) * 0.92;
     let distance = 0;
     const offset = new THREE.Vector3();
-    for (const point of this.shown) {
+    // The path keeps clear of what lies over the view: buttons above, the legend below.
+    const clear = Math.max(0.5, 1 - 110 / this.box.clientHeight);
+    this.shown.forEach((point, k) => {
       offset.copy(point).sub(this.middle);
       const depth = offset.dot(away);
       distance = Math.max(distance, depth + Math.abs(offset.dot(right)) / (tangent * this.camera.aspect),
-        depth + Math.abs(offset.dot(above)) / tangent);
-    }
+        depth + Math.abs(offset.dot(above)) / (k < this.numPathPoints ? clear * tangent : tangent));
+    });
     this.controls.target.copy(this.middle);
     this.camera.position.copy(this.middle).addScaledVector(away, distance);
     this.controls.update();

@@ -147,7 +147,7 @@ Camera ReadOurs(const fs::path& file, const YAML::Node& root) {
     const std::string key = entry.first.Scalar();
     if (std::find(kKeys.begin(), kKeys.end(), key) == kKeys.end()) {
       Fail(file,
-           key +
+           "line " + std::to_string(entry.first.Mark().line + 1) + ": " + key +
                " is no key of a camera file; known are model, width, height, fx, fy, cx, cy, "
                "distortion, readout_s");
     }

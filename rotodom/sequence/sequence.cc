@@ -291,9 +291,13 @@ Camera MatchToImages(const Camera& camera, const cv::Size& image_size) {
     matched.height = image_size.height;
   }
   if (matched.width != image_size.width || matched.height != image_size.height) {
+    const bool is_turned = camera.width == image_size.height && camera.height == image_size.width;
     throw std::runtime_error("camera says " + SizeText({camera.width, camera.height}) +
                              ", images are " + SizeText(image_size) +
-                             ": give the calibration of these images");
+                             (is_turned
+                                  ? ": calibrate with the camera held as it was here, upright "
+                                    "and across are two calibrations"
+                                  : ": give the calibration of these images"));
   }
   return matched;
 }

@@ -51,13 +51,33 @@ Overlap Compare(const std::vector<Ray>& keyframe, const std::vector<Ray>& frame)
   return {overlap, Median(std::move(angles))};
 }
 
+// How often keyframes saw each track so far.
+class Sightings {
+ public:
+  explicit Sightings(std::size_t num_tracks) : counts_(num_tracks, 0) {}
+
+  void Add(const std::vector<Ray>& keyframe) {
+    for (const Ray& ray : keyframe) ++counts_[ray.track];
+  }
+  // Tracks of a frame that keyframes see under two angles: they carry the scale on.
+  int NumLinks(const std::vector<Ray>& frame) const {
+    return static_cast<int>(std::count_if(
+        frame.begin(), frame.end(), [&](const Ray& ray) { return counts_[ray.track] >= 2; }));
+  }
+
+ private:
+  std::vector<int> counts_;
+};
+
 // One pass over the frames.
 // @param rays_of  of every frame that sees something.
 std::set<FrameId> SelectFrom(const RotationMap& cam_from_world,
                              const std::map<FrameId, std::vector<Ray>>& rays_of,
+                             std::size_t num_tracks,
                              const std::vector<HeldStretch>& held,
                              const KeyframeOptions& options) {
   std::set<FrameId> keyframes;
+  Sightings sightings(num_tracks);
   static const std::vector<Ray> kNoRays;
   const auto rays = [&](FrameId frame) -> const std::vector<Ray>& {
     const auto entry = rays_of.find(frame);
@@ -65,11 +85,11 @@ std::set<FrameId> SelectFrom(const RotationMap& cam_from_world,
   };
   FrameId keyframe = cam_from_world.begin()->first;
   FrameId before = keyframe;  // newest frame that could still become a keyframe
-  keyframes.insert(keyframe);
   const auto take = [&](FrameId frame) {
-    keyframes.insert(frame);
+    if (keyframes.insert(frame).second) sightings.Add(rays(frame));
     keyframe = frame;
   };
+  take(keyframe);
   for (const auto& [frame, rotation] : cam_from_world) {
     const auto stretch =
         std::find_if(held.begin(), held.end(), [&, f = frame](const HeldStretch& s) {
@@ -86,7 +106,10 @@ std::set<FrameId> SelectFrom(const RotationMap& cam_from_world,
       continue;
     }
     Overlap overlap = Compare(rays(keyframe), rays(frame));
-    if (overlap.shared_ratio < options.min_shared_ratio && before > keyframe) {
+    const double least_links =
+        options.min_linked_ratio * static_cast<double>(rays(keyframe).size());
+    const bool breaks = keyframes.size() > 1 && sightings.NumLinks(rays(frame)) < least_links;
+    if ((overlap.shared_ratio < options.min_shared_ratio || breaks) && before > keyframe) {
       // Too late: the frame before still shares enough.
       take(before);
       overlap = Compare(rays(keyframe), rays(frame));
@@ -110,6 +133,9 @@ std::optional<std::string> KeyframeOptions::Problem() const {
   if (!(min_shared_ratio >= 0.0 && min_shared_ratio < 1.0)) {
     return OutOfRange("min_shared_ratio", min_shared_ratio, "0 or more and below 1");
   }
+  if (!(min_linked_ratio >= 0.0 && min_linked_ratio < 1.0)) {
+    return OutOfRange("min_linked_ratio", min_linked_ratio, "0 or more and below 1");
+  }
   if (min_keyframes < 0) return OutOfRange("min_keyframes", min_keyframes, "at least 0");
   if (every_frames < 0) return OutOfRange("every_frames", every_frames, "at least 0");
   return std::nullopt;
@@ -125,11 +151,11 @@ std::set<FrameId> SelectKeyframes(const RotationMap& cam_from_world,
   const auto rays_of = RaysOfFrames(cam_from_world, tracks);
   constexpr int kMaxHalvings = 4;
   KeyframeOptions asked = options;
-  std::set<FrameId> keyframes = SelectFrom(cam_from_world, rays_of, held, asked);
+  std::set<FrameId> keyframes = SelectFrom(cam_from_world, rays_of, tracks.size(), held, asked);
   for (int k = 0; k < kMaxHalvings && options.every_frames == 0; ++k) {
     if (static_cast<int>(keyframes.size()) >= options.min_keyframes) break;
     asked.min_parallax_deg /= 2.0;
-    keyframes = SelectFrom(cam_from_world, rays_of, held, asked);
+    keyframes = SelectFrom(cam_from_world, rays_of, tracks.size(), held, asked);
   }
   return keyframes;
 }

@@ -19,6 +19,10 @@ struct KeyframeOptions {
   // It becomes one before fewer than this share of the last keyframe's tracks is left, so that
   // tracks link neighbouring keyframes.
   double min_shared_ratio = 0.35;
+  // And before fewer of its tracks than this share of the last keyframe's have been seen by two
+  // keyframes: scale passes from one pair of keyframes to the next by points of known depth alone,
+  // and a quick turn takes those away first.
+  double min_linked_ratio = 0.2;
   // Where these give fewer keyframes, as of a short walk, less parallax is asked for: half of it,
   // up to four times. Two keyframes give no map, three tell a lens badly.
   int min_keyframes = 5;
@@ -32,6 +36,7 @@ struct KeyframeOptions {
   void Visit(Visitor&& visit) {
     visit("min_parallax_deg", min_parallax_deg);
     visit("min_shared_ratio", min_shared_ratio);
+    visit("min_linked_ratio", min_linked_ratio);
     visit("min_keyframes", min_keyframes);
     visit("every_frames", every_frames);
   }

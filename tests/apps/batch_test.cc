@@ -58,8 +58,7 @@ class Batch : public testing::Test {
                              "\n"
                              "- name: broken\n  path: 'no & <such>, \"thing\"'\n"
                              "- path: " +
-                             turn + "\n  command: rotations\n  ground_truth: " + turn +
-                             "/groundtruth_tum.txt\n");
+                             turn + "\n  command: rotations\n");
   }
 
   fs::path Out() const { return folder_.path() / "out"; }
@@ -115,6 +114,7 @@ TEST_F(Batch, SurvivesABrokenSequenceAndGoesOnWhereItStopped) {
             ReadSummary(Out() / "walk")["counts"]["points"].get<int>());
   EXPECT_GT(std::stod(results["walk"]["cpu_s"]), 0.0);
   EXPECT_EQ(results["gimbal"]["status"], "done");
+  EXPECT_EQ(results["gimbal"]["coverage"], "1.0000") << "its ground truth lies with the images";
   EXPECT_EQ(results["gimbal"]["points"], "") << "orientations alone have no points";
   EXPECT_EQ(results["gimbal"]["ate_m"], "");
   EXPECT_EQ(results["broken"]["status"], "failed");

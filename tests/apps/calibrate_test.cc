@@ -298,6 +298,12 @@ TEST_F(FocalGuess, ImagesCorrectAFocalLengthThatIsHalfAsLongAgain) {
   EXPECT_EQ(result.exit_code, 0) << result.error;
   const nlohmann::ordered_json calibration = ReadSummary(Out())["calibration"];
   EXPECT_EQ(calibration["source"], "focal_guess_width");
+  // What the passes took is not counted with the stages.
+  const nlohmann::ordered_json seconds = ReadSummary(Out())["seconds"];
+  const double guess_s = seconds["focal_guess"].get<double>();
+  const double rest_s = seconds["orientations"].get<double>() + seconds["positions"].get<double>();
+  EXPECT_GT(guess_s, 0.0);
+  EXPECT_LE(guess_s + rest_s, seconds["total"].get<double>());
   EXPECT_EQ(calibration["guess_px"], 384.0);
   EXPECT_NEAR(calibration["first_pass_px"].get<double>(), truth_px, 0.1 * truth_px);
   EXPECT_NEAR(calibration["refined_px"].get<double>(), truth_px, 0.1 * truth_px);

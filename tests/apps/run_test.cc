@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <filesystem>
+#include <map>
 #include <sstream>
 #include <string>
 #include <vector>
@@ -37,6 +38,7 @@ class RunCommand : public testing::Test {
       const CommandResult run =
           Rotslam({"run", Sequence(kind).string(), "--no-report", "--out=" + Out(kind).string()});
       ASSERT_EQ(run.exit_code, 0) << run.error;
+      said_[kind] = run.error;
     }
   }
   static void TearDownTestSuite() {
@@ -47,9 +49,12 @@ class RunCommand : public testing::Test {
   static fs::path Sequence(const std::string& kind) { return shared_->path() / kind; }
   static fs::path Out(const std::string& kind) { return shared_->path() / (kind + "_out"); }
   static fs::path Truth(const std::string& kind) { return Sequence(kind) / "groundtruth_tum.txt"; }
+  // What the run printed on the way.
+  static std::string Said(const std::string& kind) { return said_[kind]; }
 
  private:
   static inline const TemporaryFolder* shared_ = nullptr;
+  static inline std::map<std::string, std::string> said_;
 };
 
 class OnBothSequences : public RunCommand, public testing::WithParamInterface<const char*> {
@@ -295,6 +300,9 @@ TEST_F(RunCommand, GimbalStandsWhileItOnlyRotates) {
   ASSERT_EQ(lines.size(), kNumFrames + 1u);
   EXPECT_EQ(lines.front().find("# frames "), 0u) << lines.front();
   EXPECT_NE(lines.front().find("whose scale nothing measures"), std::string::npos);
+  EXPECT_THAT(Said("gimbal"),
+              HasSubstr("of the map from frame " + std::to_string(turns[0].last + 1) + " on"));
+  EXPECT_THAT(Said("gimbal"), HasSubstr(" 1 pure-rotation stretch, "));
   lines.erase(lines.begin());
   const auto position_text = [&](int frame) {
     std::istringstream words(lines[frame]);

@@ -15,6 +15,11 @@ run(${CMAKE_COMMAND} -S ${consumer_dir} -B ${work_dir}/build -G ${generator}
 run(${CMAKE_COMMAND} --build ${work_dir}/build)
 run(${work_dir}/build/consumer ${work_dir}/trajectory.txt)
 run(${work_dir}/prefix/bin/rotslam eval --json ${work_dir}/trajectory.txt ${work_dir}/trajectory.txt)
+foreach(file demo.yaml cameras/7scenes.yaml)
+  if(NOT EXISTS ${work_dir}/prefix/${data_dir}/rotslam/config/${file})
+    message(FATAL_ERROR "config/${file} is not installed")
+  endif()
+endforeach()
 # The vocabulary is in the program, wherever it lies.
 run(${work_dir}/prefix/bin/rotslam vocabulary info)
 

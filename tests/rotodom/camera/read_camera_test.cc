@@ -245,7 +245,8 @@ TEST_F(ReadCameraTest, ComplaintsNameFileAndKey) {
               HasSubstr("distortion has 4 values, pinhole takes none"));
   EXPECT_THAT(Complaint("model: equidistant\nfx: 5\ndistortion: [1, x, 3, 4]\n" + end),
               HasSubstr("distortion[1] is 'x'"));
-  EXPECT_THAT(Complaint("model: pinhole\nfx: 5\nfocal: 5\n" + end), HasSubstr("focal is no key"));
+  EXPECT_THAT(Complaint("model: pinhole\nfx: 5\nfocal: 5\n" + end),
+              HasSubstr("line 3: focal is no key"));
   EXPECT_THAT(Complaint("model: pinhole\nfx: 5\nwidth: 640\n" + end), HasSubstr("640x0"));
   EXPECT_THAT(Complaint("model: pinhole\nfx: 5\nwidth: 640.5\n" + end), HasSubstr("width is"));
   EXPECT_THAT(Complaint("model: pinhole\n  fx: : 5\n"), HasSubstr("line "));

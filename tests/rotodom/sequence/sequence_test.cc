@@ -441,7 +441,14 @@ TEST(MatchToImages, FillsInOrRefuses) {
     MatchToImages(camera, {752, 480});
     FAIL() << "no exception";
   } catch (const std::runtime_error& error) {
-    EXPECT_THAT(error.what(), HasSubstr("camera says 640x480, images are 752x480: "));
+    EXPECT_THAT(error.what(), HasSubstr("camera says 640x480, images are 752x480: give"));
+  }
+  // A phone filmed upright: players and OpenCV turn such videos.
+  try {
+    MatchToImages(camera, {480, 640});
+    FAIL() << "no exception";
+  } catch (const std::runtime_error& error) {
+    EXPECT_THAT(error.what(), HasSubstr("camera held as it was here"));
   }
 }
 

@@ -118,6 +118,28 @@ TEST(SelectKeyframes, SlowLossOfTracksTakesTheFrameBefore) {
   EXPECT_EQ(Select(walk), (List{0, 4, 6, 7, 8}));
 }
 
+// Frame 3 is a keyframe. From frame 5 on, only one point is left that frames 0
+// and 3 both saw; frame 4 is the last that sees what frame 3 does and what comes.
+TEST(SelectKeyframes, PointsOfKnownDepthReachFromOneKeyframeToTheNext) {
+  Walk walk = MakeWalk(7, 0.0);
+  for (int p = 0; p < 21; ++p) {
+    const bool old = p < 7;
+    std::erase_if(walk.tracks[p].observations, [&](const Observation& o) {
+      return p > 0 && (old ? o.frame >= FrameId{5} : o.frame < FrameId{3});
+    });
+  }
+  KeyframeOptions options;
+  options.min_parallax_deg = 1.0;
+  options.min_shared_ratio = 0.1;
+  options.min_keyframes = 0;
+  std::vector<HeldStretch> held(1);
+  held[0].first = held[0].last = FrameId{3};
+  options.min_linked_ratio = 0.0;
+  EXPECT_EQ(Select(walk, held, options), (List{0, 3, 6}));
+  options.min_linked_ratio = 0.2;
+  EXPECT_EQ(Select(walk, held, options), (List{0, 3, 4, 6}));
+}
+
 TEST(SelectKeyframes, HeldStretchesKeepTheirEndsAlone) {
   Walk walk = MakeWalk(20, 0.3, {6, 7, 8, 9, 10, 11, 12, 13, 14});
   // The stretch begins at frame 5: the first step without motion leads to frame 6.
@@ -160,6 +182,8 @@ TEST(KeyframeOptions, NamesTheFirstFieldOutOfRange) {
   EXPECT_TRUE(options.Problem().value_or("none").starts_with("every_frames is -1"));
   options.min_keyframes = -1;
   EXPECT_TRUE(options.Problem().value_or("none").starts_with("min_keyframes is -1"));
+  options.min_linked_ratio = 1.0;
+  EXPECT_TRUE(options.Problem().value_or("none").starts_with("min_linked_ratio is 1"));
   options.min_shared_ratio = 1.0;
   EXPECT_TRUE(options.Problem().value_or("none").starts_with("min_shared_ratio is 1"));
   options.min_parallax_deg = 0.0;
