@@ -168,20 +168,22 @@ PositionResult TurningInPlace(const PositionResult& moving,
   return WithoutMap(std::move(result), {});
 }
 
-}  // namespace
+std::vector<Track> TracksOf(const Orientations& orientations) {
+  return BuildTracks(
+      orientations.edge_matches, orientations.features, AllFrames(orientations.cam_from_world), 2);
+}
 
-PositionResult FindPositions(const Orientations& orientations,
-                             const Camera& camera,
-                             const PipelineOptions& options,
-                             int num_threads,
-                             Progress& progress) {
+// FindKeyframePositions from the tracks of all frames.
+PositionResult MapKeyframes(const Orientations& orientations,
+                            const std::vector<Track>& all_tracks,
+                            const Camera& camera,
+                            const PipelineOptions& options,
+                            int num_threads,
+                            Progress& progress) {
   PositionResult result;
   result.cam_from_world = orientations.cam_from_world;
   result.camera = camera;
 
-  progress.StartStage("tracks", -1);
-  std::vector<Track> all_tracks = BuildTracks(
-      orientations.edge_matches, orientations.features, AllFrames(result.cam_from_world), 2);
   result.held =
       FindHeldStretches(orientations.graph, result.cam_from_world, options.held_stretches);
   const HeldStretch* everything = StretchAt(result.held, result.cam_from_world.begin()->first);
@@ -269,6 +271,31 @@ PositionResult FindPositions(const Orientations& orientations,
                     std::to_string(result.bundles.front().after.mean_px) + " px, " +
                     Describe(result.camera));
   if (auto turning = find_turning()) return *std::move(turning);
+
+  return result;
+}
+
+}  // namespace
+
+PositionResult FindKeyframePositions(const Orientations& orientations,
+                                     const Camera& camera,
+                                     const PipelineOptions& options,
+                                     int num_threads,
+                                     Progress& progress) {
+  progress.StartStage("tracks", -1);
+  return MapKeyframes(orientations, TracksOf(orientations), camera, options, num_threads, progress);
+}
+
+PositionResult FindPositions(const Orientations& orientations,
+                             const Camera& camera,
+                             const PipelineOptions& options,
+                             int num_threads,
+                             Progress& progress) {
+  progress.StartStage("tracks", -1);
+  std::vector<Track> all_tracks = TracksOf(orientations);
+  PositionResult result =
+      MapKeyframes(orientations, all_tracks, camera, options, num_threads, progress);
+  if (result.components.empty()) return result;
 
   progress.StartStage("frames between keyframes", -1);
   all_tracks = WithBearingsOf(result.camera, std::move(all_tracks));
