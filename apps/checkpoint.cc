@@ -85,12 +85,19 @@ std::string ReadAll(const fs::path& file) {
   return {std::istreambuf_iterator<char>(stream), std::istreambuf_iterator<char>()};
 }
 
+// A damaged file may say anything, and a message is one line.
+std::string OneLine(std::string text) {
+  const auto is_control = [](unsigned char c) { return c < 0x20 || c == 0x7f; };
+  std::replace_if(text.begin(), text.end(), is_control, '?');
+  return text;
+}
+
 // In words: the first thing that is not the same.
 std::string Difference(const RunIdentity& was, const RunIdentity& is) {
   for (std::size_t k = 0; k < std::min(was.size(), is.size()); ++k) {
     if (was[k] == is[k]) continue;
     if (was[k].first != is[k].first) break;
-    return is[k].first + " was " + was[k].second + ", is now " + is[k].second;
+    return is[k].first + " was " + OneLine(was[k].second) + ", is now " + is[k].second;
   }
   return "other options";
 }

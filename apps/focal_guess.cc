@@ -39,6 +39,7 @@ std::string Pixels(double focal_px) {
 PipelineOptions FirstPass(PipelineOptions options) {
   options.loop.use_loops = false;
   options.krot.use_bracket = options.krot.start == "bisection";
+  options.ba.find_covariance = false;
   FreeFocal(options.ba.lens);
   const std::int64_t last =
       options.sequence.first + (kFirstPassFrames - 1) * std::int64_t{options.sequence.stride};
@@ -66,7 +67,7 @@ std::optional<double> FocalFrom(const InputFlags& flags,
   if (orientations.interrupted) throw InterruptedError(end);
   const LastWords last_words(interruption, [&] { progress.Warn(end); });
   const PositionResult positions =
-      FindPositions(orientations, part.camera, options, common.NumThreads(), progress);
+      FindKeyframePositions(orientations, part.camera, options, common.NumThreads(), progress);
   if (positions.camera.fx == part.camera.fx) return std::nullopt;
   return positions.camera.fx;
 }

@@ -3,10 +3,10 @@
 #include <algorithm>
 #include <iterator>
 
+#include "apps/placement.h"
 #include "apps/turning.h"
 #include "output/cloud_outliers.h"
 #include "rotodom/averaging/anchors.h"
-#include "rotodom/types/parallel.h"
 
 namespace rotslam {
 namespace {
@@ -18,13 +18,6 @@ std::set<FrameId> AllFrames(const RotationMap& rotations) {
   std::set<FrameId> frames;
   for (const auto& [frame, rotation] : rotations) frames.insert(frame);
   return frames;
-}
-
-const HeldStretch* StretchAt(const std::vector<HeldStretch>& held, FrameId frame) {
-  const auto stretch = std::find_if(held.begin(), held.end(), [&](const HeldStretch& s) {
-    return s.first <= frame && frame <= s.last;
-  });
-  return stretch == held.end() ? nullptr : &*stretch;
 }
 
 // x_new = scale * turn * x_old + shift.
@@ -122,88 +115,14 @@ void Append(Reconstruction& map, Reconstruction part) {
   std::move(part.tracks.begin(), part.tracks.end(), std::back_inserter(map.tracks));
 }
 
-// Position between the nearest frames that have one, linear in time.
-Eigen::Vector3d InterpolatedCenter(const CenterMap& centers,
-                                   const std::vector<double>& timestamps_s,
-                                   FrameId frame) {
-  const auto after = centers.lower_bound(frame);
-  if (after == centers.end()) return centers.rbegin()->second;
-  if (after->first == frame || after == centers.begin()) return after->second;
-  const auto before = std::prev(after);
-  const double from_s = timestamps_s[before->first.value];
-  const double to_s = timestamps_s[after->first.value];
-  const double weight = (timestamps_s[frame.value] - from_s) / (to_s - from_s);
-  return (1.0 - weight) * before->second + weight * after->second;
-}
-
-// Poses of the frames that the map does not hold.
-// @param rotation_covariance  of their rotations, where it is known.
-void PlaceRemainingFrames(const std::vector<Track>& all_tracks,
-                          const std::vector<double>& timestamps_s,
-                          const std::map<FrameId, Eigen::Matrix3d>& rotation_covariance,
-                          const Camera& camera,
-                          const ResectionOptions& options,
-                          int num_threads,
-                          PositionResult& result) {
-  const CenterMap anchors = result.map.center_in_world;
-  result.center_in_world = anchors;
-  std::vector<FrameId> remaining;
-  for (const auto& [frame, rotation] : result.cam_from_world) {
-    if (anchors.contains(frame)) continue;
-    // Inside a stretch the place is that of its ends, to the last bit.
-    const HeldStretch* stretch = StretchAt(result.held, frame);
-    if (stretch != nullptr &&
-        (anchors.contains(stretch->first) || anchors.contains(stretch->last))) {
-      const FrameId end = anchors.contains(stretch->first) ? stretch->first : stretch->last;
-      result.center_in_world[frame] = anchors.at(end);
-    } else {
-      remaining.push_back(frame);
-    }
-  }
-
-  std::map<FrameId, std::vector<PointSighting>> sightings;
-  for (const Track& track : all_tracks) {
-    const auto point = result.map.point_in_world.find(track.id);
-    if (point == result.map.point_in_world.end()) continue;
-    for (const Observation& observation : track.observations) {
-      sightings[observation.frame].push_back(
-          {point->second, observation.keypoint_px, observation.sigma_px});
-    }
-  }
-  std::vector<std::optional<ResectedPose>> poses(remaining.size());
-  static const std::vector<PointSighting> kNone;
-  ParallelFor(static_cast<int>(remaining.size()), num_threads, [&](int k) {
-    const FrameId frame = remaining[k];
-    const auto seen = sightings.find(frame);
-    ResectionStart start{result.cam_from_world.at(frame),
-                         InterpolatedCenter(anchors, timestamps_s, frame),
-                         std::nullopt};
-    const auto covariance = rotation_covariance.find(frame);
-    if (covariance != rotation_covariance.end()) start.rotation_covariance = covariance->second;
-    poses[k] = ResectFrame(camera, seen == sightings.end() ? kNone : seen->second, start, options);
-  });
-  for (std::size_t k = 0; k < remaining.size(); ++k) {
-    if (poses[k]) {
-      result.cam_from_world[remaining[k]] = poses[k]->cam_from_world;
-      result.center_in_world[remaining[k]] = poses[k]->center_in_world;
-      ++result.num_resected;
-    }
-  }
-  const CenterMap known = result.center_in_world;
-  for (std::size_t k = 0; k < remaining.size(); ++k) {
-    if (poses[k]) continue;
-    result.center_in_world[remaining[k]] = InterpolatedCenter(known, timestamps_s, remaining[k]);
-    ++result.num_interpolated;
-  }
-}
-
 // Points of all tracks, not only the keyframes', from the poses of all frames.
 Reconstruction MakeCloudOf(const PositionResult& result,
                            const std::vector<Track>& all_tracks,
-                           const Camera& camera,
-                           const BundleOptions& options) {
+                           int num_threads,
+                           BundleOptions options) {
+  options.num_threads = num_threads;
   BundleProblem problem;
-  problem.camera = camera;
+  problem.camera = result.camera;
   problem.start.cam_from_world = result.cam_from_world;
   problem.start.center_in_world = result.center_in_world;
   problem.start.point_in_world = result.map.point_in_world;
@@ -249,20 +168,22 @@ PositionResult TurningInPlace(const PositionResult& moving,
   return WithoutMap(std::move(result), {});
 }
 
-}  // namespace
+std::vector<Track> TracksOf(const Orientations& orientations) {
+  return BuildTracks(
+      orientations.edge_matches, orientations.features, AllFrames(orientations.cam_from_world), 2);
+}
 
-PositionResult FindPositions(const Orientations& orientations,
-                             const Camera& camera,
-                             const PipelineOptions& options,
-                             int num_threads,
-                             Progress& progress) {
+// FindKeyframePositions from the tracks of all frames.
+PositionResult MapKeyframes(const Orientations& orientations,
+                            const std::vector<Track>& all_tracks,
+                            const Camera& camera,
+                            const PipelineOptions& options,
+                            int num_threads,
+                            Progress& progress) {
   PositionResult result;
   result.cam_from_world = orientations.cam_from_world;
   result.camera = camera;
 
-  progress.StartStage("tracks", -1);
-  std::vector<Track> all_tracks = BuildTracks(
-      orientations.edge_matches, orientations.features, AllFrames(result.cam_from_world), 2);
   result.held =
       FindHeldStretches(orientations.graph, result.cam_from_world, options.held_stretches);
   const HeldStretch* everything = StretchAt(result.held, result.cam_from_world.begin()->first);
@@ -351,26 +272,42 @@ PositionResult FindPositions(const Orientations& orientations,
                     Describe(result.camera));
   if (auto turning = find_turning()) return *std::move(turning);
 
+  return result;
+}
+
+}  // namespace
+
+PositionResult FindKeyframePositions(const Orientations& orientations,
+                                     const Camera& camera,
+                                     const PipelineOptions& options,
+                                     int num_threads,
+                                     Progress& progress) {
+  progress.StartStage("tracks", -1);
+  return MapKeyframes(orientations, TracksOf(orientations), camera, options, num_threads, progress);
+}
+
+PositionResult FindPositions(const Orientations& orientations,
+                             const Camera& camera,
+                             const PipelineOptions& options,
+                             int num_threads,
+                             Progress& progress) {
+  progress.StartStage("tracks", -1);
+  std::vector<Track> all_tracks = TracksOf(orientations);
+  PositionResult result =
+      MapKeyframes(orientations, all_tracks, camera, options, num_threads, progress);
+  if (result.components.empty()) return result;
+
   progress.StartStage("frames between keyframes", -1);
   all_tracks = WithBearingsOf(result.camera, std::move(all_tracks));
-  PlaceRemainingFrames(all_tracks,
-                       orientations.timestamps_s,
-                       AnchorCovariances(orientations.graph,
-                                         result.cam_from_world,
-                                         AllFrames(result.map.cam_from_world),
-                                         options.rotodom.averaging),
-                       result.camera,
-                       options.resection,
-                       num_threads,
-                       result);
+  PlaceRemainingFrames(orientations, all_tracks, options, num_threads, result);
   // Their neighbours have moved a little since.
   InterpolateUnconnected(orientations, result.cam_from_world);
   progress.EndStage(std::to_string(result.num_resected) + " resected, " +
                     std::to_string(result.num_interpolated) + " interpolated");
 
   progress.StartStage("cloud", -1);
-  result.cloud = WithoutShallowPoints(
-      MakeCloudOf(result, all_tracks, result.camera, bundle_options), options.cloud_min_angle_deg);
+  result.cloud = WithoutShallowPoints(MakeCloudOf(result, all_tracks, num_threads, options.ba),
+                                      options.cloud_min_angle_deg);
   const PointMap rest = WithoutOutliers(result.cloud.point_in_world, options.cloud_outliers);
   result.num_cloud_outliers = static_cast<int>(result.cloud.point_in_world.size() - rest.size());
   result.cloud.point_in_world = rest;

@@ -44,6 +44,15 @@ PositionResult FindPositions(const Orientations& orientations,
                              int num_threads,
                              Progress& progress);
 
+/// The first part of FindPositions, up to bundle adjustment: what asks for the lens or the
+/// keyframes alone need not wait for the rest. Has no cloud, and the frames between keyframes no
+/// positions.
+PositionResult FindKeyframePositions(const Orientations& orientations,
+                                     const Camera& camera,
+                                     const PipelineOptions& options,
+                                     int num_threads,
+                                     Progress& progress);
+
 /// Camera->world poses of all frames of `centers`.
 Trajectory MakeTrajectory(const std::vector<double>& timestamps_s,
                           const RotationMap& cam_from_world,

@@ -1,5 +1,7 @@
 #pragma once
 
+#include <stdexcept>
+
 #include "rotodom/odometry.h"
 #include "rotodom/types/archive.h"
 
@@ -33,6 +35,10 @@ void TransferValue(Archive& archive, RelativeRotation& edge) {
          parallax_px] = edge;
   archive(i, j, j_from_i, covariance, translation_direction, num_inliers, rotation_only);
   archive(baseline_strength, noise_px, parallax_px);
+  // Checksums say nothing of a file that somebody made.
+  if (Archive::kIsReader && (i == j || i.value < 0 || j.value < 0)) {
+    throw std::runtime_error("has an edge without two different views");
+  }
 }
 
 template <class Archive>

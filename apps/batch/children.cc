@@ -1,5 +1,6 @@
 #include "apps/batch/children.h"
 
+#include <array>
 #include <cerrno>
 #include <ctime>
 #include <optional>
@@ -7,7 +8,7 @@
 #include <system_error>
 
 #include <fcntl.h>
-#include <spawn.h>
+#include <sys/prctl.h>
 #include <sys/resource.h>
 #include <sys/wait.h>
 #include <unistd.h>
@@ -30,30 +31,50 @@ ChildEnd Describe(int status, const rusage& usage, Clock::time_point start) {
   return end;
 }
 
-// What posix_spawn takes, freed at the end.
-struct SpawnSetup {
-  SpawnSetup(const std::filesystem::path& log, const sigset_t& mask) {
-    posix_spawn_file_actions_init(&actions);
-    posix_spawn_file_actions_addopen(&actions, STDIN_FILENO, "/dev/null", O_RDONLY, 0);
-    posix_spawn_file_actions_addopen(
-        &actions, STDOUT_FILENO, log.c_str(), O_WRONLY | O_CREAT | O_TRUNC, 0666);
-    posix_spawn_file_actions_adddup2(&actions, STDOUT_FILENO, STDERR_FILENO);
-    posix_spawnattr_init(&attributes);
-    // A group of its own, so that a terminal's Ctrl-C comes once: from us.
-    posix_spawnattr_setflags(&attributes, POSIX_SPAWN_SETPGROUP | POSIX_SPAWN_SETSIGMASK);
-    posix_spawnattr_setpgroup(&attributes, 0);
-    posix_spawnattr_setsigmask(&attributes, &mask);
-  }
-  ~SpawnSetup() {
-    posix_spawn_file_actions_destroy(&actions);
-    posix_spawnattr_destroy(&attributes);
-  }
-  SpawnSetup(const SpawnSetup&) = delete;
-  SpawnSetup& operator=(const SpawnSetup&) = delete;
+bool OpenAs(int number, const char* path, int flags) {
+  const int file = open(path, flags, 0666);
+  if (file < 0 || file == number) return file == number;
+  const bool done = dup2(file, number) == number;
+  close(file);
+  return done;
+}
 
-  posix_spawn_file_actions_t actions;
-  posix_spawnattr_t attributes;
-};
+// Makes the child that was just forked the program. Allocates nothing: another thread may have held
+// the lock that takes. Comes back only with the number of what the system refused.
+int Become(const std::vector<char*>& argv, const char* log, const sigset_t& mask, pid_t parent) {
+  // Else a run would go on unseen and write where the next batch does. It leaves a checkpoint.
+  prctl(PR_SET_PDEATHSIG, SIGKILL);
+  if (getppid() != parent) return ESRCH;  // killed before that
+  // A group of its own, so that a terminal's Ctrl-C comes once: from us.
+  setpgid(0, 0);
+  if (!OpenAs(STDIN_FILENO, "/dev/null", O_RDONLY) ||
+      !OpenAs(STDOUT_FILENO, log, O_WRONLY | O_CREAT | O_TRUNC) ||
+      dup2(STDOUT_FILENO, STDERR_FILENO) < 0) {
+    return errno;
+  }
+  pthread_sigmask(SIG_SETMASK, &mask, nullptr);
+  execv("/proc/self/exe", argv.data());
+  return errno;
+}
+
+// Forks and makes the child the program; throws std::system_error when the system refuses.
+pid_t Spawn(const std::vector<char*>& argv, const char* log, const sigset_t& mask) {
+  std::array<int, 2> ends = {};  // of a pipe that closes with exec, or first says why there is none
+  if (pipe2(ends.data(), O_CLOEXEC) != 0) throw std::system_error(errno, std::generic_category());
+  const pid_t parent = getpid();
+  const pid_t child = fork();
+  if (child == 0) {
+    const int error = Become(argv, log, mask, parent);
+    if (write(ends[1], &error, sizeof(error)) < 0) _exit(126);
+    _exit(127);
+  }
+  int error = child < 0 ? errno : 0;
+  close(ends[1]);
+  if (child > 0 && read(ends[0], &error, sizeof(error)) > 0) waitpid(child, nullptr, 0);
+  close(ends[0]);
+  if (error != 0) throw std::system_error(error, std::generic_category());
+  return child;
+}
 
 }  // namespace
 
@@ -78,16 +99,13 @@ void Children::Start(int id,
   argv.reserve(words.size() + 1);
   for (std::string& word : words) argv.push_back(word.data());
   argv.push_back(nullptr);
-  const SpawnSetup setup(log, mask_before_);
-  pid_t pid = 0;
   const Clock::time_point start = Clock::now();
-  const int error =
-      posix_spawn(&pid, "/proc/self/exe", &setup.actions, &setup.attributes, argv.data(), environ);
-  if (error != 0) {
-    throw std::runtime_error(log.string() + ": cannot start a process that prints there: " +
-                             std::generic_category().message(error));
+  try {
+    running_[Spawn(argv, log.c_str(), mask_before_)] = {id, start};
+  } catch (const std::system_error& error) {
+    throw std::runtime_error(
+        log.string() + ": cannot start a process that prints there: " + error.code().message());
   }
-  running_[pid] = {id, start};
 }
 
 std::pair<int, ChildEnd> Children::Wait() {

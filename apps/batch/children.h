@@ -22,7 +22,9 @@ struct ChildEnd {
 };
 
 /// Processes of this same program that run beside each other. While an object lives, Ctrl-C and
-/// SIGTERM do nothing here but reach all of them, so that each ends in its own good order.
+/// SIGTERM do nothing here but reach all of them, so that each ends in its own good order. Where
+/// the thread that has started them ends before them, as it does when this process is killed, they
+/// are killed.
 class Children {
  public:
   Children();

@@ -297,6 +297,7 @@ void Append(const Value* values, std::size_t count, std::string& bytes) {
 // The caller has checked that so many are there.
 template <class Value>
 void Take(std::string_view& bytes, Value* values, std::size_t count) {
+  if (count == 0) return;  // `values` may be null then
   std::memcpy(values, bytes.data(), count * sizeof(Value));
   bytes.remove_prefix(count * sizeof(Value));
 }

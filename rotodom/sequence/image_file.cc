@@ -6,6 +6,7 @@
 #include <cstdint>
 #include <fstream>
 #include <iterator>
+#include <string_view>
 #include <system_error>
 #include <utility>
 #include <vector>
@@ -112,6 +113,46 @@ std::string DamageOfPng(const Bytes& bytes) {
   return "PNG data are cut off";
 }
 
+// ---- WebP
+
+// Little-endian; the caller has checked that they are there.
+std::uint32_t LittleNumberAt(const Bytes& bytes, std::size_t at, int num_bytes) {
+  std::uint32_t number = 0;
+  for (int k = num_bytes - 1; k >= 0; --k) number = number << 8 | bytes[at + k];
+  return number;
+}
+
+// Pixels that the header claims, in its container or bare, as the decoder takes both; else 0.
+std::uint64_t ClaimedPixelsOfWebp(const Bytes& bytes) {
+  const std::string_view text(reinterpret_cast<const char*>(bytes.data()), bytes.size());
+  const auto has = [text](std::size_t at, std::string_view letters) {
+    return at <= text.size() && text.substr(at).starts_with(letters);
+  };
+  std::size_t at = 0;
+  // "RIFF", the file's length, "WEBP", then chunks: four letters, their length, that many bytes.
+  if (has(0, "RIFF") && has(8, "WEBP")) at = 20;
+  if (bytes.size() < at + 10) return 0;
+  if (at > 0 && has(12, "VP8X")) {
+    return (std::uint64_t{1} + LittleNumberAt(bytes, at + 4, 3)) *
+           (1 + LittleNumberAt(bytes, at + 7, 3));
+  }
+  if (bytes[at] == 0x2f) {  // without loss: two numbers of 14 bits
+    const std::uint32_t bits = LittleNumberAt(bytes, at + 1, 4);
+    return std::uint64_t{1 + (bits & 0x3fff)} * (1 + (bits >> 14 & 0x3fff));
+  }
+  if (!has(at + 3, "\x9d\x01\x2a")) return 0;
+  return std::uint64_t{LittleNumberAt(bytes, at + 6, 2) & 0x3fff} *
+         (LittleNumberAt(bytes, at + 8, 2) & 0x3fff);
+}
+
+// One colour costs nothing a pixel, so that a small file may hold much; no photograph is like that.
+bool IsCutOffWebp(const Bytes& bytes) {
+  constexpr std::uint64_t kMostPixelsOfOneColour = std::uint64_t{1} << 24;
+  constexpr std::uint64_t kMostPixelsPerByte = 8 * 64;
+  return ClaimedPixelsOfWebp(bytes) >
+         std::max(kMostPixelsOfOneColour, kMostPixelsPerByte * bytes.size());
+}
+
 // ---- any
 
 DecodedImage Failed(std::string problem) { return {{}, std::move(problem)}; }
@@ -146,6 +187,7 @@ DecodedImage ReadImageFile(const std::filesystem::path& file) {
   if (bytes.empty()) return Failed("file is empty");
   if (IsJpeg(bytes) && IsCutOffJpeg(bytes)) return Failed("JPEG data are cut off");
   if (std::string damage = DamageOfPng(bytes); !damage.empty()) return Failed(std::move(damage));
+  if (IsCutOffWebp(bytes)) return Failed("WebP data are cut off");
   cv::Mat image;
   try {
     image = cv::imdecode(bytes,

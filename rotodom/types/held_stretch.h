@@ -1,5 +1,6 @@
 #pragma once
 
+#include <algorithm>
 #include <vector>
 
 #include "rotodom/types/ids.h"
@@ -19,5 +20,13 @@ struct HeldStretch {
   double evidence = 0.0;  // mean share of the edges across its steps that show no baseline
   std::vector<FrameRange> still = {};  // where it does not turn either, ascending
 };
+
+/// The one that `frame` lies in; null when there is none.
+inline const HeldStretch* StretchAt(const std::vector<HeldStretch>& held, FrameId frame) {
+  const auto stretch = std::find_if(held.begin(), held.end(), [&](const HeldStretch& s) {
+    return s.first <= frame && frame <= s.last;
+  });
+  return stretch == held.end() ? nullptr : &*stretch;
+}
 
 }  // namespace rotslam

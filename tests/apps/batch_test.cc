@@ -12,6 +12,7 @@
 #include <gtest/gtest.h>
 #include <nlohmann/json.hpp>
 #include <signal.h>
+#include <sys/prctl.h>
 #include <sys/wait.h>
 #include <unistd.h>
 
@@ -275,27 +276,31 @@ class InterruptedBatch : public Batch {
   }
 };
 
-enum class Stop { kInterrupt, kKillChild, kKillAll };
+enum class Stop { kInterrupt, kKillChild, kKillBatch };
 
 class StoppedBatch : public InterruptedBatch, public testing::WithParamInterface<Stop> {};
 INSTANTIATE_TEST_SUITE_P(Ways,
                          StoppedBatch,
-                         testing::Values(Stop::kInterrupt, Stop::kKillChild, Stop::kKillAll));
+                         testing::Values(Stop::kInterrupt, Stop::kKillChild, Stop::kKillBatch));
 
 TEST_P(StoppedBatch, GoesOnInTheMiddleOfASequence) {
   const fs::path list = LongList();
   const pid_t batch = StartAndHold(list);
   const pid_t child = ChildOf(batch);
+  prctl(PR_SET_CHILD_SUBREAPER, 1);  // the batch's child is ours when it is gone
   if (GetParam() == Stop::kInterrupt) kill(batch, SIGINT);
-  if (GetParam() != Stop::kInterrupt) kill(child, SIGKILL);
-  if (GetParam() == Stop::kKillAll) kill(batch, SIGKILL);
+  if (GetParam() == Stop::kKillChild) kill(child, SIGKILL);
+  if (GetParam() == Stop::kKillBatch) kill(batch, SIGKILL);
   kill(batch, SIGCONT);
   const std::map<Stop, int> exit_codes = {
-      {Stop::kInterrupt, 130}, {Stop::kKillChild, 1}, {Stop::kKillAll, -SIGKILL}};
+      {Stop::kInterrupt, 130}, {Stop::kKillChild, 1}, {Stop::kKillBatch, -SIGKILL}};
   EXPECT_EQ(End(batch), exit_codes.at(GetParam()));
+  if (GetParam() == Stop::kKillBatch) {
+    EXPECT_EQ(End(child), -SIGKILL) << "works on unseen";
+  }
   ASSERT_TRUE(fs::exists(State()));
   EXPECT_EQ(RunBatch(list, {"--collect"}).exit_code, 1);
-  EXPECT_EQ(Results()["long"]["status"], GetParam() == Stop::kKillAll ? "unfinished" : "failed");
+  EXPECT_EQ(Results()["long"]["status"], GetParam() == Stop::kKillBatch ? "unfinished" : "failed");
 
   const CommandResult second = RunBatch(list);
   EXPECT_EQ(second.exit_code, 0) << second.error;

@@ -304,6 +304,16 @@ TEST_F(SequenceTest, ReadsHundredMegapixels) {
   }
 }
 
+// Of `image`, without loss and in a container, whose size its header then makes 16384 x 16384.
+std::string LargestWebp(const cv::Mat& image) {
+  std::vector<unsigned char> bytes;
+  EXPECT_TRUE(cv::imencode(".webp", image, bytes, {cv::IMWRITE_WEBP_QUALITY, 101}));
+  EXPECT_EQ(std::string(bytes.begin() + 12, bytes.begin() + 16), "VP8L");
+  for (int k = 21; k < 24; ++k) bytes[k] = 0xff;
+  bytes[24] |= 0x0f;
+  return {bytes.begin(), bytes.end()};
+}
+
 // The files are whole but for the size in their headers, which is beyond what they can hold.
 TEST_F(SequenceTest, BelievesNoSizeThatTheFileCannotHold) {
   std::string jpeg = CmykJpeg(40, 24, false);
@@ -312,12 +322,32 @@ TEST_F(SequenceTest, BelievesNoSizeThatTheFileCannotHold) {
   WriteText("0.jpg", jpeg);
   WriteImage("1.png");
   WriteText("2.png", PngThatSays(28671, 28671));
+  const std::string webp = LargestWebp(cv::Mat::zeros(12, 16, CV_8UC3));
+  WriteText("3.webp", webp);
+  WriteText("4.webp", webp.substr(20));  // bare, which the decoder takes, too
   const auto sequence = OpenSequence(folder_, {});
   const std::vector<Frame> frames = ReadAll(*sequence);
-  ASSERT_EQ(frames.size(), 3u);
+  ASSERT_EQ(frames.size(), 5u);
   EXPECT_EQ(frames[0].problem, "JPEG data are cut off");
   EXPECT_EQ(frames[1].problem, "");
   EXPECT_EQ(frames[2].problem, "PNG data are cut off");
+  EXPECT_EQ(frames[3].problem, "WebP data are cut off");
+  EXPECT_EQ(frames[4].problem, "WebP data are cut off");
+}
+
+TEST_F(SequenceTest, ReadsSmallFilesOfOneColour) {
+  const cv::Mat image(1080, 1920, CV_8UC3, cv::Scalar(10, 20, 30));
+  for (const int quality : {80, 101}) {  // with and without loss
+    cv::imwrite((folder_ / (std::to_string(quality) + ".webp")).string(),
+                image,
+                {cv::IMWRITE_WEBP_QUALITY, quality});
+  }
+  const std::vector<Frame> frames = ReadAll(*OpenSequence(folder_, {}));
+  ASSERT_EQ(frames.size(), 2u);
+  for (const Frame& frame : frames) {
+    EXPECT_EQ(frame.problem, "");
+    EXPECT_EQ(frame.image.size(), image.size());
+  }
 }
 
 TEST_F(SequenceTest, BringsEveryPixelFormatToEightBits) {
