@@ -11,7 +11,6 @@
 
 #include <Eigen/Dense>
 
-#include "rotodom/relative_rotation/plane_twin.h"
 #include "rotodom/relative_rotation/refinement.h"
 
 namespace rotslam {
@@ -166,13 +165,6 @@ class Search {
       rotation = RefineRotation(spread_, rotation, scale, 2).j_from_i;
     }
     DescendFrom(rotation);
-  }
-
-  void DescendFromTwin() {
-    FocusOn(best_.model.j_from_i);
-    if (const auto twin = TwinOverPlane(thinned_, best_.model, threshold_)) {
-      DescendAndConsider(*twin);
-    }
   }
 
   void Sample(std::uint64_t seed) {
@@ -356,7 +348,6 @@ Consensus FindConsensus(const PairArrays& pairs,
   Search search(pairs, focal_px, options);
   search.DescendFrom(predicted_j_from_i);
   search.DescendFromAligned(predicted_j_from_i);
-  search.DescendFromTwin();
   search.Sample(seed);
   Consensus best = search.best();
   best.members = WithoutChance(pairs, best.model, options.inlier_px / focal_px);
