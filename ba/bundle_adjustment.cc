@@ -83,7 +83,7 @@ class Rounds {
     if (!good_ || !round.enabled) return;
     const auto start = std::chrono::steady_clock::now();
     last_ = &round;
-    ClassifyAll(round, /*retriangulate=*/true, options_, state);
+    ClassifyAll(round, Placement::kAnywhere, options_, state);
     const ResidualStatistics before = Statistics(state);
     const bool is_first = result_.summary.rounds.empty();
     Minimise(name, round, start, state);
@@ -101,7 +101,7 @@ class Rounds {
       if (!good_ || !round.enabled) return;
       const auto start = std::chrono::steady_clock::now();
       const std::vector<bool> before = UsedFlags(state);
-      ClassifyAll(round, /*retriangulate=*/true, options_, state);
+      ClassifyAll(round, Placement::kNearby, options_, state);
       const std::vector<bool> after = UsedFlags(state);
       std::size_t changed = 0;
       for (std::size_t o = 0; o < after.size(); ++o) changed += before[o] != after[o] ? 1 : 0;
@@ -284,7 +284,7 @@ BundleResult RefineBundle(const BundleProblem& problem, const BundleOptions& opt
     summary.final_cost = summary.rounds.back().final_cost;
   }
   if (rounds.good()) {
-    ClassifyAll(rounds.last(), /*retriangulate=*/false, options, state);
+    ClassifyAll(rounds.last(), Placement::kStays, options, state);
     summary.after = Statistics(state);
     rounds.FindCovariances(options.fine, state);
     TakeResult(problem, state, result);
@@ -299,7 +299,7 @@ BundleResult RefineBundle(const BundleProblem& problem, const BundleOptions& opt
 
 Reconstruction TriangulateTracks(const BundleProblem& problem, const BundleOptions& options) {
   BundleState state = MakeBundleState(problem, options);
-  ClassifyAll(options.fine, /*retriangulate=*/true, options, state);
+  ClassifyAll(options.fine, Placement::kAnywhere, options, state);
   BundleResult result;
   TakeResult(problem, state, result);
   result.reconstruction.center_in_world = problem.start.center_in_world;

@@ -50,8 +50,10 @@ double ErrorPx(const BundleState& state,
 struct Verdict {
   std::vector<bool> fits;
   int num_fits = 0;
-  // Cost over all of them, each error cut off at the limit. Minimisation, which moves what fits,
-  // lowers the same sum: one round after the other comes to rest.
+  // Cost over all of them. Of what fits the round's loss, which minimisation lowers too, so that
+  // one round after the other comes to rest. Of the others somewhat more than that at their limit,
+  // half way to its square: else points give away good observations for a smaller loss of the
+  // rest.
   double score = kInfinity;
 };
 
@@ -64,12 +66,12 @@ class Classifier {
         min_observations_(options.min_observations),
         min_angle_rad_(options.min_angle_deg * kRadFromDeg) {}
 
-  // Marks the observations that the track's position, or else a new one, explains.
-  void Classify(TrackState& track) const {
+  // Marks the observations that the track's position, or else a better one, explains.
+  void Classify(bool anywhere, TrackState& track) const {
     Best best;
     if (track.has_position) Offer(track, track.position, best);
     if (best.num_misfits > 0) {
-      Search(track, best);
+      if (anywhere) Search(track, best);
       Settle(track, best);
     }
     track.has_position = best.position.has_value();
@@ -158,7 +160,9 @@ class Classifier {
       verdict.fits.push_back(error_px <= limit_px);
       verdict.num_fits += verdict.fits.back() ? 1 : 0;
       const double sigmas = std::min(error_px, limit_px) / sight.observation->sigma_px;
-      verdict.score += Loss(sigmas * sigmas)[0];
+      const double square = sigmas * sigmas;
+      const double loss = Loss(square)[0];
+      verdict.score += verdict.fits.back() ? loss : 0.5 * (loss + square);
     }
     return verdict;
   }
@@ -285,16 +289,20 @@ void RemoveWeakFrames(const Classifier& classifier, int min_observations, Bundle
 }  // namespace
 
 void ClassifyAll(const BundleRound& round,
-                 bool retriangulate,
+                 Placement placement,
                  const BundleOptions& options,
                  BundleState& state) {
   const Classifier classifier(state, round, options);
-  if (retriangulate) {
+  if (placement != Placement::kStays) {
     for (FrameState& frame : state.frames) frame.weak = false;
   }
   ParallelFor(static_cast<int>(state.tracks.size()), options.num_threads, [&](int k) {
     TrackState& track = state.tracks[k];
-    retriangulate ? classifier.Classify(track) : classifier.Recheck(track);
+    if (placement == Placement::kStays) {
+      classifier.Recheck(track);
+    } else {
+      classifier.Classify(placement == Placement::kAnywhere, track);
+    }
   });
   RemoveWeakFrames(classifier, options.min_frame_observations, state);
 }

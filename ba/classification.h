@@ -4,12 +4,19 @@
 
 namespace rotslam {
 
+/// Where classification looks for a track's position.
+enum class Placement {
+  kAnywhere,  // from all observations and from pairs, too
+  kNearby,    // from where it is, downhill
+  kStays,
+};
+
 /// Decides which observations fit, the cameras standing where they stand, and which tracks make a
 /// point or a direction; frames left with too few observations become weak.
 /// @param round          its limit, and its loss, by which positions are compared.
-/// @param retriangulate  look for each track's position anew; else it is judged where it is.
+/// @param placement      where a track's position is looked for.
 void ClassifyAll(const BundleRound& round,
-                 bool retriangulate,
+                 Placement placement,
                  const BundleOptions& options,
                  BundleState& state);
 
