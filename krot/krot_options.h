@@ -35,7 +35,7 @@ struct KrotOptions {
   int max_bracket_views = 1000;
   // Views that go into the start's programs together. Components with more are solved in blocks of
   // so many, which overlap by a quarter and are joined by what they share (JoinBlocks).
-  int max_lp_views = 250;
+  int max_lp_views = 1000;
   // Observations per view in the start's programs.
   int observations_per_view = 40;
   // Tracks under this parallax come into the linear programs last, for the sake of conditioning.
