@@ -10,6 +10,7 @@
 #include <Eigen/Cholesky>
 
 #include "krot/draw.h"
+#include "rotodom/types/disjoint_sets.h"
 #include "rotodom/types/median.h"
 
 namespace rotslam {
@@ -170,12 +171,9 @@ Eigen::MatrixXd Reconcile(const std::vector<int>& nodes,
 
 // Blocks that ties connect, those with most views together.
 std::vector<int> LargestGroup(const std::vector<Block>& blocks, const std::vector<Tie>& ties) {
-  std::vector<int> group(blocks.size());
-  for (std::size_t k = 0; k < group.size(); ++k) group[k] = static_cast<int>(k);
+  DisjointSets groups(static_cast<int>(blocks.size()));
   for (const Tie& tie : ties) {
-    const int from = group[tie.a];
-    const int to = group[tie.b];
-    std::replace(group.begin(), group.end(), from, to);
+    groups.Join(tie.a, tie.b);
   }
   std::vector<int> best;
   std::size_t most = 0;
@@ -183,7 +181,7 @@ std::vector<int> LargestGroup(const std::vector<Block>& blocks, const std::vecto
     std::vector<int> members;
     std::set<FrameId> views;
     for (std::size_t k = 0; k < blocks.size(); ++k) {
-      if (group[k] != static_cast<int>(g)) continue;
+      if (groups.Find(static_cast<int>(k)) != static_cast<int>(g)) continue;
       members.push_back(static_cast<int>(k));
       for (const auto& [view, center] : blocks[k].centers) views.insert(view);
     }

@@ -54,6 +54,12 @@ void Append(std::string& text, double value) {
 
 }  // namespace
 
+std::optional<std::filesystem::path> TimesBeside(const std::filesystem::path& trajectory) {
+  std::filesystem::path times = trajectory.parent_path() / "times.txt";
+  if (!std::filesystem::exists(times)) return std::nullopt;
+  return times;
+}
+
 Trajectory ReadTrajectory(const std::filesystem::path& path,
                           const std::optional<std::filesystem::path>& times) {
   const std::vector<TextRow> rows = ReadTextRows(path);

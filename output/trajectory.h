@@ -21,6 +21,9 @@ namespace rotslam {
 Trajectory ReadTrajectory(const std::filesystem::path& path,
                           const std::optional<std::filesystem::path>& times = std::nullopt);
 
+/// Timestamps of a KITTI file where none are named: times.txt in the same folder, if it is there.
+std::optional<std::filesystem::path> TimesBeside(const std::filesystem::path& trajectory);
+
 /// Writes the TUM format: timestamps with 9 decimals, the rest with 12 significant digits.
 /// @param comments  lines that go before the poses, each behind a '#'.
 /// Throws std::invalid_argument when a pose is not finite, std::runtime_error when the file cannot

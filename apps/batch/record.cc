@@ -11,6 +11,7 @@
 #include "output/atomic_file.h"
 #include "output/option_list.h"
 #include "output/summary.h"
+#include "output/trajectory.h"
 #include "rotodom/sequence/layout.h"
 
 namespace rotslam {
@@ -65,14 +66,8 @@ void AddMetrics(const BatchEntry& entry,
             ? FindLayout(entry.path, entry.options.sequence.fps).ground_truth_file
             : std::optional<fs::path>(entry.ground_truth);
     if (!truth) return;
-    // Of a KITTI file, as `rotslam report` takes them.
-    std::optional<fs::path> times;
-    const fs::path beside = truth->parent_path() / "times.txt";
-    if (!entry.times.empty()) {
-      times = entry.times;
-    } else if (fs::exists(beside)) {
-      times = beside;
-    }
+    const std::optional<fs::path> times =
+        entry.times.empty() ? TimesBeside(*truth) : std::optional<fs::path>(entry.times);
     const TrajectoryMetrics metrics =
         CompareTrajectoryFiles(*truth, EstimateOf(entry, directory), times, options);
     result.coverage = Coverage(metrics, static_cast<int>(result.frames.value_or(0)));

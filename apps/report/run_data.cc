@@ -42,8 +42,7 @@ Trajectory RotationsOnly(const std::vector<RotationRow>& rows) {
 // KITTI's poses carry no times: those that lie beside them, else the numbers of the frames.
 Trajectory ReadTruth(const TruthSource& source, const fs::path& file) {
   if (!source.times.empty()) return ReadTrajectory(file, source.times);
-  const fs::path beside = file.parent_path() / "times.txt";
-  return fs::exists(beside) ? ReadTrajectory(file, beside) : ReadTrajectory(file);
+  return ReadTrajectory(file, TimesBeside(file));
 }
 
 // The place of each pair's estimate among the frames; both ascend in time.
