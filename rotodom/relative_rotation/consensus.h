@@ -8,10 +8,12 @@
 
 namespace rotslam {
 
-/// The epipolar model that most matches agree on.
+/// An epipolar model that many matches agree on.
 struct Consensus {
   EpipolarModel model;
   int num_inliers = 0;
+  // What its score lacks to the best model's, by inlier of that one; zero for the best itself.
+  double excess = 0.0;
   // Positions of the pairs, right and wrong ones, among which agreement is not by chance;
   // ascending.
   std::vector<int> members;
@@ -23,15 +25,20 @@ struct Consensus {
 ///
 /// With little parallax the epipolar distance has several minima, a rotation traded for a
 /// translation. So the search descends from the prediction and from the rotation that aligns the
-/// bearings best, each with every principal direction of the flow, and then from small samples.
+/// bearings best, each with every principal direction of the flow, then from small samples, and at
+/// last from the other motion that shows a plane in the same places (TwinOverPlane).
 /// Descents run on a part of the pairs, so that their cost does not depend on the number of pairs.
 /// @param predicted_j_from_i  where to start; may be far off.
 /// @param focal_px            pixels per radian, for the thresholds.
-/// @return  num_inliers within options.inlier_px, possibly too few to mean anything.
-Consensus FindConsensus(const PairArrays& pairs,
-                        const Rotation& predicted_j_from_i,
-                        double focal_px,
-                        const RelativeRotationOptions& options,
-                        std::uint64_t seed);
+/// @return  the best model, and behind it the best of those minima whose rotation is another one
+///          (2 deg) and whose score is at most 0.25 by inlier worse. A twin comes first only if its
+///          score is better by more than that: wrong matches and noise that neighbours share decide
+///          between such two, not the motion. num_inliers within options.inlier_px, possibly too
+///          few to mean anything.
+std::vector<Consensus> FindConsensus(const PairArrays& pairs,
+                                     const Rotation& predicted_j_from_i,
+                                     double focal_px,
+                                     const RelativeRotationOptions& options,
+                                     std::uint64_t seed);
 
 }  // namespace rotslam

@@ -104,48 +104,15 @@ bool IsFixed(const Eigen::Matrix3d& information) {
   return eigenvalues[0] > 1e-10 * eigenvalues[2];
 }
 
-}  // namespace
-
-std::optional<std::string> RelativeRotationOptions::Problem() const {
-  if (!(inlier_px > 0.0)) return OutOfRange("inlier_px", inlier_px, "positive");
-  if (!(loss_sigmas > 0.0)) return OutOfRange("loss_sigmas", loss_sigmas, "positive");
-  if (!(min_noise_px > 0.0)) return OutOfRange("min_noise_px", min_noise_px, "positive");
-  if (!(shared_error_px >= 0.0)) {
-    return OutOfRange("shared_error_px", shared_error_px, "zero or more");
-  }
-  if (!(finest_px > 0.0)) return OutOfRange("finest_px", finest_px, "positive");
-  if (min_samples < 0) return OutOfRange("min_samples", min_samples, "zero or more");
-  if (sample_size < 5) return OutOfRange("sample_size", sample_size, "at least 5");
-  if (!(confidence > 0.0 && confidence < 1.0)) {
-    return "confidence = " + std::to_string(confidence) + ": must lie between 0 and 1";
-  }
-  if (max_samples < 1) return OutOfRange("max_samples", max_samples, "at least 1");
-  if (refine_iterations < 1) {
-    return OutOfRange("refine_iterations", refine_iterations, "at least 1");
-  }
-  if (min_inliers < 6) return OutOfRange("min_inliers", min_inliers, "at least 6");
-  return ProblemIn("baseline", baseline);
-}
-
-std::optional<RelativeRotationEstimate> EstimateRelativeRotation(
-    const std::vector<BearingPair>& pairs,
-    const Rotation& predicted_j_from_i,
+// Refines the model on its members, tests the baseline, and chooses the rotation to believe.
+std::optional<RelativeRotationEstimate> EstimateFrom(
+    const PairArrays& all,
+    const Consensus& consensus,
     double focal_px,
     const RelativeRotationOptions& options,
-    std::uint64_t seed,
     std::span<const KeypointCovariances> covariances) {
-  if (const auto problem = options.Problem())
-    throw std::invalid_argument("RelativeRotationOptions: " + *problem);
-  CheckPairs(pairs);
-  if (!covariances.empty() && covariances.size() != pairs.size()) {
-    throw std::invalid_argument("EstimateRelativeRotation: not one covariance per pair");
-  }
-  if (static_cast<int>(pairs.size()) < options.min_inliers) return std::nullopt;
-
   const double threshold = options.inlier_px / focal_px;
   const double smallest_noise = options.min_noise_px / focal_px;
-  const PairArrays all(pairs);
-  const Consensus consensus = FindConsensus(all, predicted_j_from_i, focal_px, options, seed);
   if (consensus.num_inliers < options.min_inliers) return std::nullopt;
   const PairArrays arrays(all, consensus.members);
 
@@ -155,6 +122,7 @@ std::optional<RelativeRotationEstimate> EstimateRelativeRotation(
       RefineEpipolar(arrays, consensus.model, loss, options.refine_iterations, 1e-9);
   RelativeRotationEstimate estimate;
   estimate.num_samples = consensus.num_samples;
+  estimate.excess = consensus.excess;
 
   const std::vector<double> squared_distances = SquaredDistances(arrays, epipolar.model);
   const std::vector<double> squared_flows = SquaredFlows(arrays, epipolar.model.j_from_i);
@@ -212,6 +180,69 @@ std::optional<RelativeRotationEstimate> EstimateRelativeRotation(
   estimate.translation_covariance =
       basis * covariance.bottomRightCorner<2, 2>() * basis.transpose();
   return estimate;
+}
+
+}  // namespace
+
+std::optional<std::string> RelativeRotationOptions::Problem() const {
+  if (!(inlier_px > 0.0)) return OutOfRange("inlier_px", inlier_px, "positive");
+  if (!(loss_sigmas > 0.0)) return OutOfRange("loss_sigmas", loss_sigmas, "positive");
+  if (!(min_noise_px > 0.0)) return OutOfRange("min_noise_px", min_noise_px, "positive");
+  if (!(shared_error_px >= 0.0)) {
+    return OutOfRange("shared_error_px", shared_error_px, "zero or more");
+  }
+  if (!(finest_px > 0.0)) return OutOfRange("finest_px", finest_px, "positive");
+  if (min_samples < 0) return OutOfRange("min_samples", min_samples, "zero or more");
+  if (sample_size < 5) return OutOfRange("sample_size", sample_size, "at least 5");
+  if (!(confidence > 0.0 && confidence < 1.0)) {
+    return "confidence = " + std::to_string(confidence) + ": must lie between 0 and 1";
+  }
+  if (max_samples < 1) return OutOfRange("max_samples", max_samples, "at least 1");
+  if (refine_iterations < 1) {
+    return OutOfRange("refine_iterations", refine_iterations, "at least 1");
+  }
+  if (min_inliers < 6) return OutOfRange("min_inliers", min_inliers, "at least 6");
+  return ProblemIn("baseline", baseline);
+}
+
+std::vector<RelativeRotationEstimate> EstimateRotationHypotheses(
+    const std::vector<BearingPair>& pairs,
+    const Rotation& predicted_j_from_i,
+    double focal_px,
+    const RelativeRotationOptions& options,
+    std::uint64_t seed,
+    std::span<const KeypointCovariances> covariances) {
+  if (const auto problem = options.Problem())
+    throw std::invalid_argument("RelativeRotationOptions: " + *problem);
+  CheckPairs(pairs);
+  if (!covariances.empty() && covariances.size() != pairs.size()) {
+    throw std::invalid_argument("EstimateRelativeRotation: not one covariance per pair");
+  }
+  if (static_cast<int>(pairs.size()) < options.min_inliers) return {};
+
+  const PairArrays all(pairs);
+  std::vector<RelativeRotationEstimate> estimates;
+  for (const Consensus& consensus :
+       FindConsensus(all, predicted_j_from_i, focal_px, options, seed)) {
+    auto estimate = EstimateFrom(all, consensus, focal_px, options, covariances);
+    // What the best one does not bear, the rest do not replace.
+    if (!estimate) break;
+    estimates.push_back(*std::move(estimate));
+  }
+  return estimates;
+}
+
+std::optional<RelativeRotationEstimate> EstimateRelativeRotation(
+    const std::vector<BearingPair>& pairs,
+    const Rotation& predicted_j_from_i,
+    double focal_px,
+    const RelativeRotationOptions& options,
+    std::uint64_t seed,
+    std::span<const KeypointCovariances> covariances) {
+  auto estimates =
+      EstimateRotationHypotheses(pairs, predicted_j_from_i, focal_px, options, seed, covariances);
+  if (estimates.empty()) return std::nullopt;
+  return std::move(estimates.front());
 }
 
 }  // namespace rotslam

@@ -83,6 +83,8 @@ struct RelativeRotationEstimate {
   double parallax_px = 0.0;  // root mean square of the inliers' flow that rotation does not explain
   std::vector<int> inliers;  // positions in `pairs`, ascending
   int num_samples = 0;
+  // What its score lacks to that of the best hypothesis, nats by inlier of that one.
+  double excess = 0.0;
 };
 
 /// Estimates the rotation between two views from matched bearings, whatever the baseline, zero
@@ -114,6 +116,18 @@ struct RelativeRotationEstimate {
 /// Source:  Torr, Geometric motion segmentation and model selection, 1998 (criterion); Muhle et
 /// al., The Probabilistic Normal Epipolar Constraint, CVPR 2022 (weights).
 std::optional<RelativeRotationEstimate> EstimateRelativeRotation(
+    const std::vector<BearingPair>& pairs,
+    const Rotation& predicted_j_from_i,
+    double focal_px,
+    const RelativeRotationOptions& options,
+    std::uint64_t seed,
+    std::span<const KeypointCovariances> covariances = {});
+
+/// The same, and behind it a second estimate where the matches allow another rotation almost as
+/// well, mostly the other motion that shows a plane in the same places. Two views cannot tell which
+/// of them is right; a third one can (ChooseConsistent).
+/// @return  empty where EstimateRelativeRotation has none; ascending in `excess`, at most two.
+std::vector<RelativeRotationEstimate> EstimateRotationHypotheses(
     const std::vector<BearingPair>& pairs,
     const Rotation& predicted_j_from_i,
     double focal_px,

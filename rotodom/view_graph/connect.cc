@@ -1,9 +1,11 @@
 #include "rotodom/view_graph/connect.h"
 
 #include <array>
+#include <cmath>
 
 #include "rotodom/types/options.h"
 #include "rotodom/types/parallel.h"
+#include "rotodom/view_graph/consistency.h"
 
 namespace rotslam {
 namespace {
@@ -39,14 +41,46 @@ std::vector<std::array<int, 2>> FindCommonPoints(const Features& view_i, const F
   return keypoints;
 }
 
-}  // namespace
+// The connection as an estimate from these keypoints sees it.
+Connection ConnectionOf(const RelativeRotationEstimate& estimate,
+                        FrameId i,
+                        FrameId j,
+                        const std::vector<std::array<int, 2>>& keypoints) {
+  Connection connection;
+  connection.edge.i = connection.matches.frame_i = i;
+  connection.edge.j = connection.matches.frame_j = j;
+  connection.edge.j_from_i = estimate.j_from_i;
+  connection.edge.covariance = estimate.covariance;
+  connection.edge.translation_direction = estimate.translation_direction;
+  connection.edge.num_inliers = static_cast<int>(estimate.inliers.size());
+  connection.edge.rotation_only = estimate.rotation_only;
+  connection.edge.baseline_strength = estimate.baseline.strength;
+  connection.edge.noise_px = estimate.noise_px;
+  connection.edge.parallax_px = estimate.parallax_px;
+  std::size_t next_inlier = 0;
+  for (int k = 0; k < static_cast<int>(keypoints.size()); ++k) {
+    if (next_inlier < estimate.inliers.size() && estimate.inliers[next_inlier] == k) {
+      connection.matches.pairs.push_back(keypoints[k]);
+      ++next_inlier;
+    } else {
+      connection.outliers_j.push_back(keypoints[k][1]);
+    }
+  }
+  return connection;
+}
 
-std::optional<Connection> ConnectByMatches(const Features& view_i,
-                                           const Features& view_j,
-                                           const std::vector<std::array<int, 2>>& keypoints,
-                                           const Rotation& predicted_j_from_i,
-                                           double focal_px,
-                                           const ConnectOptions& options) {
+// What a pair of views may be connected by, the best first.
+struct ConnectionHypotheses {
+  std::vector<Connection> connections;
+  std::vector<double> excesses;
+};
+
+ConnectionHypotheses HypothesesByMatches(const Features& view_i,
+                                         const Features& view_j,
+                                         const std::vector<std::array<int, 2>>& keypoints,
+                                         const Rotation& predicted_j_from_i,
+                                         double focal_px,
+                                         const ConnectOptions& options) {
   std::vector<BearingPair> pairs;
   pairs.reserve(keypoints.size());
   for (const auto& [of_i, of_j] : keypoints) {
@@ -56,35 +90,45 @@ std::optional<Connection> ConnectByMatches(const Features& view_i,
   const FrameId j = view_j.frame;
   const std::uint64_t seed = options.seed * 0x9E3779B97F4A7C15ULL +
                              (std::uint64_t(i.value) << 32 | std::uint32_t(j.value));
-  const auto estimate = EstimateRelativeRotation(pairs,
-                                                 predicted_j_from_i,
-                                                 focal_px,
-                                                 options.relative_rotation,
-                                                 seed,
-                                                 CovariancesOf(view_i, view_j, keypoints));
-  if (!estimate) return std::nullopt;
-
-  Connection connection;
-  connection.edge.i = connection.matches.frame_i = i;
-  connection.edge.j = connection.matches.frame_j = j;
-  connection.edge.j_from_i = estimate->j_from_i;
-  connection.edge.covariance = estimate->covariance;
-  connection.edge.translation_direction = estimate->translation_direction;
-  connection.edge.num_inliers = static_cast<int>(estimate->inliers.size());
-  connection.edge.rotation_only = estimate->rotation_only;
-  connection.edge.baseline_strength = estimate->baseline.strength;
-  connection.edge.noise_px = estimate->noise_px;
-  connection.edge.parallax_px = estimate->parallax_px;
-  std::size_t next_inlier = 0;
-  for (int k = 0; k < static_cast<int>(keypoints.size()); ++k) {
-    if (next_inlier < estimate->inliers.size() && estimate->inliers[next_inlier] == k) {
-      connection.matches.pairs.push_back(keypoints[k]);
-      ++next_inlier;
-    } else {
-      connection.outliers_j.push_back(keypoints[k][1]);
-    }
+  ConnectionHypotheses hypotheses;
+  for (const RelativeRotationEstimate& estimate :
+       EstimateRotationHypotheses(pairs,
+                                  predicted_j_from_i,
+                                  focal_px,
+                                  options.relative_rotation,
+                                  seed,
+                                  CovariancesOf(view_i, view_j, keypoints))) {
+    hypotheses.connections.push_back(ConnectionOf(estimate, i, j, keypoints));
+    hypotheses.excesses.push_back(estimate.excess);
   }
-  return connection;
+  return hypotheses;
+}
+
+// What the others' hypotheses say of the view's orientation; pairs count by the precision that
+// their number of points gives them.
+PairHypotheses OrientationsBy(const ConnectionHypotheses& hypotheses,
+                              const RotationMap& cam_from_world) {
+  PairHypotheses pair;
+  pair.weight = std::sqrt(static_cast<double>(hypotheses.connections.front().edge.num_inliers));
+  for (std::size_t h = 0; h < hypotheses.connections.size(); ++h) {
+    const RelativeRotation& edge = hypotheses.connections[h].edge;
+    pair.hypotheses.push_back({edge.j_from_i * cam_from_world.at(edge.i), hypotheses.excesses[h]});
+  }
+  return pair;
+}
+
+}  // namespace
+
+std::optional<Connection> ConnectByMatches(const Features& view_i,
+                                           const Features& view_j,
+                                           const std::vector<std::array<int, 2>>& keypoints,
+                                           const Rotation& predicted_j_from_i,
+                                           double focal_px,
+                                           const ConnectOptions& options) {
+  ConnectionHypotheses hypotheses =
+      HypothesesByMatches(view_i, view_j, keypoints, predicted_j_from_i, focal_px, options);
+  if (hypotheses.connections.empty()) return std::nullopt;
+  return std::move(hypotheses.connections.front());
 }
 
 std::optional<std::string> ViewGraphOptions::Problem() const {
@@ -110,20 +154,27 @@ std::vector<Connection> ConnectView(const Features& view,
                                     const RotationMap& predicted_cam_from_world,
                                     double focal_px,
                                     const ConnectOptions& options) {
-  std::vector<std::optional<Connection>> connections(others.size());
+  std::vector<ConnectionHypotheses> hypotheses(others.size());
   const Rotation& view_from_world = predicted_cam_from_world.at(view.frame);
   ParallelFor(static_cast<int>(others.size()), options.num_threads, [&](int k) {
     const Rotation& other_from_world = predicted_cam_from_world.at(others[k]->frame);
-    connections[k] = ConnectByMatches(*others[k],
-                                      view,
-                                      FindCommonPoints(*others[k], view),
-                                      view_from_world * other_from_world.Inverse(),
-                                      focal_px,
-                                      options);
+    hypotheses[k] = HypothesesByMatches(*others[k],
+                                        view,
+                                        FindCommonPoints(*others[k], view),
+                                        view_from_world * other_from_world.Inverse(),
+                                        focal_px,
+                                        options);
   });
+  std::erase_if(hypotheses,
+                [](const ConnectionHypotheses& of_pair) { return of_pair.connections.empty(); });
+  std::vector<PairHypotheses> orientations;
+  for (const ConnectionHypotheses& of_pair : hypotheses) {
+    orientations.push_back(OrientationsBy(of_pair, predicted_cam_from_world));
+  }
+  const std::vector<int> chosen = ChooseConsistent(orientations);
   std::vector<Connection> found;
-  for (std::optional<Connection>& connection : connections) {
-    if (connection) found.push_back(std::move(*connection));
+  for (std::size_t k = 0; k < hypotheses.size(); ++k) {
+    found.push_back(std::move(hypotheses[k].connections[chosen[k]]));
   }
   return found;
 }

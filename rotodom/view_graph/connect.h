@@ -72,7 +72,8 @@ std::optional<Connection> ConnectByMatches(const Features& view_i,
                                            const ConnectOptions& options);
 
 /// Estimates the relative rotations between `view` and each of `others` from the points that both
-/// show.
+/// show. Where those allow two rotations, the one that agrees with the other pairs is taken
+/// (ChooseConsistent).
 /// @param predicted_cam_from_world  start orientations of all views concerned.
 /// @return  one connection per other view that agrees on at least relative_rotation.min_inliers
 ///          points, in the order of `others`; the thread count does not change it.
