@@ -309,6 +309,7 @@ TEST_F(BadInput, ProgressIsPlainLinesOnStandardError) {
   EXPECT_THAT(lines, Contains(AllOf(StartsWith("input: "), HasSubstr("24 frames"))));
   EXPECT_THAT(lines, Contains(AllOf(StartsWith("camera: pinhole, fx "), HasSubstr("320x240"))));
   EXPECT_THAT(lines, Contains(StartsWith("orientations: 24 frames")));
+  ASSERT_FALSE(lines.empty());
   EXPECT_THAT(lines.back(), StartsWith("wrote "));
   fs::remove_all(Out());
   const CommandResult quiet = Run(Good());
@@ -317,6 +318,7 @@ TEST_F(BadInput, ProgressIsPlainLinesOnStandardError) {
 }
 
 TEST_F(BadInput, TheLineOnATerminalIsRenewedAndTakenAway) {
+  if (!HasTerminals()) GTEST_SKIP() << "needs a terminal (/dev/pts)";
   const CommandResult result =
       RotslamOnTerminal({"run", Good().string(), "--out=" + Out().string()}, 40);
   EXPECT_EQ(result.exit_code, 0);
@@ -336,6 +338,7 @@ TEST_F(BadInput, TheLineOnATerminalIsRenewedAndTakenAway) {
   const std::vector<std::string> shown = ShownLines(result.output);
   EXPECT_THAT(shown, Each(Not(HasSubstr("ETA"))));
   EXPECT_THAT(shown, Contains(StartsWith("orientations: 24 frames")));
+  ASSERT_FALSE(shown.empty());
   EXPECT_THAT(shown.back(), StartsWith("wrote "));
   const CommandResult quiet =
       RotslamOnTerminal({"run", Good().string(), "--out=" + Out().string(), "--quiet"}, 80);
@@ -343,6 +346,7 @@ TEST_F(BadInput, TheLineOnATerminalIsRenewedAndTakenAway) {
 }
 
 TEST_F(BadInput, AnErrorOnATerminalHasALineOfItsOwn) {
+  if (!HasTerminals()) GTEST_SKIP() << "needs a terminal (/dev/pts)";
   for (int k = 0; k < 20; ++k) {
     const std::string file = (folder_.path() / (std::to_string(k) + ".png")).string();
     ASSERT_TRUE(cv::imwrite(file, cv::Mat(960, 1280, CV_8UC1, cv::Scalar::all(0))));
