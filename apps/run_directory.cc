@@ -310,6 +310,7 @@ void AddPositions(const PositionResult& positions, const Camera& camera, RunSumm
   summary.counts.push_back({"keyframes", count(positions.keyframes.size())});
   summary.counts.push_back({"map_points", count(positions.map.point_in_world.size())});
   summary.counts.push_back({"points", count(positions.cloud.point_in_world.size())});
+  summary.counts.push_back({"shallow_points", std::int64_t{positions.num_shallow_points}});
   summary.counts.push_back({"cloud_outliers", std::int64_t{positions.num_cloud_outliers}});
   summary.counts.push_back({"components", count(positions.components.size())});
   summary.counts.push_back({"resected_frames", std::int64_t{positions.num_resected}});

@@ -97,6 +97,10 @@ function buildNotes() {
     note(whole(counts.breaks) + ' times nothing matches what came before: the orientation across is extrapolated (red ticks).');
   }
   if (counts.interpolated_frames) note('The positions of ' + whole(counts.interpolated_frames) + ' frames are interpolated.');
+  const allPoints = counts.points + counts.shallow_points + counts.cloud_outliers;
+  if (hasPositions && allPoints > 0 && 2 * counts.points < allPoints) {
+    note(`The cloud holds ${whole(counts.points)} of ${whole(allPoints)} points: the camera has moved too little for more.`);
+  }
   for (const segment of data.segments) {
     if (segment.scale !== 'continuity') continue;
     note(`Frames ${segment.first} to ${segment.last}: nothing measures the scale of this part of the map; ` +
