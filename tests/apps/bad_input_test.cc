@@ -9,6 +9,7 @@
 #include <gtest/gtest.h>
 #include <opencv2/core.hpp>
 #include <opencv2/imgcodecs.hpp>
+#include <opencv2/videoio.hpp>
 
 #include "tests/apps/small_sequence.h"
 
@@ -18,6 +19,7 @@ namespace {
 namespace fs = std::filesystem;
 using testing::AllOf;
 using testing::Contains;
+using testing::ContainsRegex;
 using testing::Each;
 using testing::ElementsAre;
 using testing::EndsWith;
@@ -89,6 +91,30 @@ TEST_F(BadInput, NoSequence) {
   EXPECT_THAT(Refusal(Run(Images(Good()).front())), HasSubstr("give the folder"));
   folder_.Write("film.mp4", "no film");
   EXPECT_THAT(Refusal(Run(folder_.path() / "film.mp4")), HasSubstr("film.mp4: not a video"));
+}
+
+TEST_F(BadInput, AVideoThatWasCutOff) {
+  const std::string whole = (folder_.path() / "whole.avi").string();
+  {
+    cv::VideoWriter writer(
+        whole, cv::VideoWriter::fourcc('M', 'J', 'P', 'G'), 30.0, cv::Size(320, 240));
+    if (!writer.isOpened()) GTEST_SKIP() << "OpenCV here writes no MJPG video";
+    for (const fs::path& image : Images(Good())) writer.write(cv::imread(image.string()));
+  }
+  const auto rotations = [&](const std::string& video) {
+    return Rotslam({"rotations",
+                    video,
+                    "--camera=" + (Good() / "camera.yaml").string(),
+                    "--out=" + Out().string(),
+                    "--no-report",
+                    "--quiet"});
+  };
+  EXPECT_EQ(rotations(whole).error, "");
+  const std::string bytes = ReadWholeFile(whole);
+  const std::string part = folder_.Write("part.avi", bytes.substr(0, bytes.size() / 2)).string();
+  EXPECT_THAT(rotations(part).error,
+              ContainsRegex("^rotslam: warning: the video ends after 1[0-9] of the 24 frames it "
+                            "announces; is the file complete\\?\n$"));
 }
 
 TEST_F(BadInput, ListsWithFaults) {
