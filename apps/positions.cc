@@ -232,7 +232,7 @@ PositionResult MapKeyframes(const Orientations& orientations,
         FindTurning(camera, keyframe_rotations, tracks, Redundancy(result.bundles), bundle_options);
     if (!turning) return std::nullopt;
     progress.EndStage("explains " + std::to_string(turning->num_observations) + " observations, " +
-                      Describe(turning->camera));
+                      DescribeRounded(turning->camera));
     return TurningInPlace(result, *turning, orientations, options.rotodom.averaging);
   };
   if (stays) {
@@ -252,6 +252,10 @@ PositionResult MapKeyframes(const Orientations& orientations,
   if (!result.krot.Usable()) {
     if (auto turning = find_turning()) return *std::move(turning);
     std::string failure = result.krot.message;
+    if (tracks.empty()) {
+      failure += "; the camera moves too little in these " +
+                 std::to_string(result.cam_from_world.size()) + " frames, give more of them";
+    }
     return WithoutMap(std::move(result), std::move(failure));
   }
 
@@ -286,9 +290,8 @@ PositionResult MapKeyframes(const Orientations& orientations,
     if (auto turning = find_turning()) return *std::move(turning);
     return WithoutMap(std::move(result), "bundle adjustment found no usable map");
   }
-  progress.EndStage(std::to_string(result.map.point_in_world.size()) + " points, mean error " +
-                    std::to_string(result.bundles.front().after.mean_px) + " px, " +
-                    Describe(result.camera));
+  progress.EndStage(std::to_string(result.map.point_in_world.size()) + " points, " +
+                    DescribeMeanError(result.bundles) + ", " + DescribeRounded(result.camera));
   if (auto turning = find_turning()) return *std::move(turning);
 
   return result;

@@ -346,20 +346,18 @@ void AddBundles(const std::vector<BundleSummary>& bundles,
                 RunSummary& summary) {
   if (bundles.empty()) return;
 
-  // Sums over the components; means are weighted by their observations.
+  // Sums over the components.
   std::int64_t observations = 0;
   std::int64_t dropped = 0;
   std::int64_t iterations = 0;
   double initial_cost = 0.0;
   double final_cost = 0.0;
-  double error_sum_px = 0.0;
   for (const BundleSummary& bundle : bundles) {
     observations += bundle.num_observations;
     dropped += bundle.num_dropped_observations;
     iterations += bundle.iterations;
     initial_cost += bundle.initial_cost;
     final_cost += bundle.final_cost;
-    error_sum_px += bundle.after.mean_px * bundle.num_observations;
   }
   const BundleSummary& largest = *std::max_element(
       bundles.begin(), bundles.end(), [](const BundleSummary& a, const BundleSummary& b) {
@@ -370,7 +368,7 @@ void AddBundles(const std::vector<BundleSummary>& bundles,
                             {"iterations", iterations},
                             {"initial_cost", initial_cost},
                             {"final_cost", final_cost},
-                            {"mean_error_px", error_sum_px / static_cast<double>(observations)},
+                            {"mean_error_px", MeanErrorPx(bundles)},
                             {"median_error_px", largest.after.median_px},
                             {"p90_error_px", largest.after.p90_px},
                             {"lens.gain", largest.lens_gain},

@@ -315,6 +315,14 @@ TEST_F(BadInput, PicturesWithoutCorners) {
   }
 }
 
+TEST_F(BadInput, TooFewFramesOfACameraThatHardlyMoves) {
+  const std::string config =
+      folder_.Write("far.yaml", "keyframes: {min_parallax_deg: 30, min_keyframes: 2}\n").string();
+  const CommandResult result = Run(Good(), {"--last=9", "--config=" + config});
+  EXPECT_EQ(result.exit_code, 1);
+  EXPECT_THAT(result.error, HasSubstr("moves too little in these 10 frames, give more of them"));
+}
+
 TEST_F(BadInput, ATinyPicture) {
   for (int k = 0; k < 4; ++k) {
     const std::string file = (folder_.path() / (std::to_string(k) + ".png")).string();
