@@ -1,11 +1,14 @@
 #include "apps/run_directory.h"
 
 #include <algorithm>
+#include <cerrno>
 #include <iterator>
 #include <map>
 #include <set>
 #include <stdexcept>
 #include <system_error>
+
+#include <unistd.h>
 
 #include "apps/focal_guess.h"
 #include "apps/unfinished.h"
@@ -138,6 +141,10 @@ std::filesystem::path PrepareRunDirectory(const std::string& out) {
   if (error || !std::filesystem::is_directory(directory)) {
     throw std::runtime_error(out + ": cannot make this folder for the results: " +
                              (error ? error.message() : "a file of that name is in the way"));
+  }
+  if (access(directory.c_str(), W_OK) != 0) {
+    throw std::runtime_error(
+        out + ": cannot write into this folder: " + std::generic_category().message(errno));
   }
   const std::filesystem::path probe = directory / ".write_test";
   ReplaceFile(probe, "");

@@ -247,7 +247,7 @@ TEST_F(BadInput, Permissions) {
   fs::create_directory(read_only);
   fs::permissions(read_only, fs::perms(0555));
   EXPECT_THAT(Refusal(run(sequence, read_only, camera)),
-              AllOf(StartsWith(read_only.string()), HasSubstr("Permission denied")));
+              AllOf(StartsWith(read_only.string() + ": "), HasSubstr("Permission denied")));
   EXPECT_THAT(Refusal(run(sequence, read_only / "below", camera)),
               AllOf(StartsWith(read_only.string()), HasSubstr("Permission denied")));
 
