@@ -323,7 +323,9 @@ Drawing RuntimeFigure(const RunData& run) {
   constexpr double kRow = 17.0;
   constexpr double kNameWidth = 128.0;
   Drawing drawing(kWidth, 48.0 + kRow * static_cast<double>(stages.size()));
-  drawing.AddText({8.0, 18.0}, "seconds per stage", {TextAnchor::kStart, 10.0, false, true, kInk});
+  drawing.AddText({8.0, 18.0},
+                  "seconds per stage; lighter: parts of stages; lightest: of bundle adjustment",
+                  {TextAnchor::kStart, 10.0, false, true, kInk});
   double longest = 1e-9;
   for (const auto& [name, seconds] : stages) longest = std::max(longest, seconds);
   double y = 32.0;
@@ -335,7 +337,8 @@ Drawing RuntimeFigure(const RunData& run) {
     const bool is_whole =
         name == "total" || name == "focal guess" || name == "orientations" || name == "positions";
     Color color = kBlue;
-    if (!is_whole) color.opacity = 0.55;
+    const bool is_round = name.starts_with("bundle ") && name != "bundle adjustment";
+    if (!is_whole) color.opacity = is_round ? 0.25 : 0.55;
     drawing.AddArea({{kNameWidth, y + 2.0},
                      {kNameWidth + length, y + 2.0},
                      {kNameWidth + length, y + 12.0},
