@@ -251,7 +251,8 @@ void AddBatchCommand(CLI::App& app, Action& action) {
   command->footer(
       "A list, of which only the first line must be there; paths count from its folder:\n"
       "  - path: kitti/sequences/00          # folder or video, as `rotslam run` takes it\n"
-      "    name: kitti00                     # folder below --out; else the last part of path\n"
+      "    name: kitti00                     # folder below --out, of a-z A-Z 0-9 . _ -;\n"
+      "                                      # else the last part of path\n"
       "    command: run                      # or rotations\n"
       "    camera: calib.txt                 # else what lies with the images\n"
       "    ground_truth: kitti/poses/00.txt  # else what lies with the images\n"

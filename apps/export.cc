@@ -139,7 +139,7 @@ std::string DescribePoints(const RunMap& map) {
   std::array<char, 80> text = {};
   std::snprintf(text.data(),
                 text.size(),
-                "%d points, mean error over them %.6f px",
+                "%d points, mean error %.3g px, averaged over the points",
                 count,
                 count == 0 ? 0.0 : sum_px / count);
   return text.data();

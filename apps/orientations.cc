@@ -119,6 +119,14 @@ class LiveCounters {
   int next_look_ = 29;
 };
 
+// What a copy has cut off is missed by nobody; the odd frame is a container's own miscount.
+void WarnOfMissingFrames(int num_frames, int num_announced, Progress& progress) {
+  const int num_missing = num_announced - num_frames;
+  if (num_missing <= std::max(2, num_announced / 100)) return;
+  progress.Warn("the video ends after " + std::to_string(num_frames) + " of the " +
+                std::to_string(num_announced) + " frames it announces; is the file complete?");
+}
+
 void TellDetails(const LoopedEstimate& estimate, Progress& progress) {
   const FrameReport& report = estimate.report;
   progress.Detail("frame " + std::to_string(estimate.frame.value) + ": " +
@@ -155,7 +163,8 @@ Orientations FindOrientations(Input& input,
   Orientations orientations;
   LiveCounters counters(options.held_stretches);
   FrameStream frames(*input.sequence, odometry, checkpoint);
-  progress.StartStage("orientations", input.sequence->NumFrames());
+  const int num_announced = input.sequence->NumFrames();
+  progress.StartStage("orientations", num_announced);
   while (const std::optional<FrameStream::Step> step = frames.Next()) {
     const auto& [frame, estimate] = *step;
     if (!frame.problem.empty()) {
@@ -186,6 +195,7 @@ Orientations FindOrientations(Input& input,
   static_cast<OdometryResult&>(orientations) = odometry.TakeResult();
 
   const int num_frames = static_cast<int>(orientations.timestamps_s.size());
+  if (!orientations.interrupted) WarnOfMissingFrames(num_frames, num_announced, progress);
   if (orientations.interrupted && (num_frames < 3 || orientations.graph.edges().empty())) {
     throw InterruptedError("interrupted after frame " + std::to_string(num_frames - 1) +
                            ": too early, nothing is written");

@@ -1,6 +1,8 @@
 #include "apps/positions.h"
 
 #include <algorithm>
+#include <array>
+#include <cstdio>
 #include <iterator>
 
 #include "apps/placement.h"
@@ -139,6 +141,23 @@ Reconstruction MakeCloudOf(const PositionResult& result,
   return TriangulateTracks(problem, options);
 }
 
+void TellCloud(const PositionResult& result, double min_angle_deg, Progress& progress) {
+  const int num_points = static_cast<int>(result.cloud.point_in_world.size());
+  std::array<char, 160> text = {};
+  std::snprintf(text.data(),
+                text.size(),
+                "%d points; %d seen under less than %g deg and %d that stood alone left out",
+                num_points,
+                result.num_shallow_points,
+                min_angle_deg,
+                result.num_cloud_outliers);
+  progress.EndStage(text.data());
+  const int num_all = num_points + result.num_shallow_points + result.num_cloud_outliers;
+  if (num_points > 0 && 2 * num_points >= num_all) return;
+  progress.Warn("the cloud holds " + std::to_string(num_points) + " of " + std::to_string(num_all) +
+                " points: the camera has moved too little for more");
+}
+
 // No map: every frame stands at the origin.
 PositionResult WithoutMap(PositionResult result, std::string failure) {
   for (const auto& [frame, rotation] : result.cam_from_world) {
@@ -213,7 +232,7 @@ PositionResult MapKeyframes(const Orientations& orientations,
         FindTurning(camera, keyframe_rotations, tracks, Redundancy(result.bundles), bundle_options);
     if (!turning) return std::nullopt;
     progress.EndStage("explains " + std::to_string(turning->num_observations) + " observations, " +
-                      Describe(turning->camera));
+                      DescribeRounded(turning->camera));
     return TurningInPlace(result, *turning, orientations, options.rotodom.averaging);
   };
   if (stays) {
@@ -233,6 +252,10 @@ PositionResult MapKeyframes(const Orientations& orientations,
   if (!result.krot.Usable()) {
     if (auto turning = find_turning()) return *std::move(turning);
     std::string failure = result.krot.message;
+    if (tracks.empty()) {
+      failure += "; the camera moves too little in these " +
+                 std::to_string(result.cam_from_world.size()) + " frames, give more of them";
+    }
     return WithoutMap(std::move(result), std::move(failure));
   }
 
@@ -267,9 +290,8 @@ PositionResult MapKeyframes(const Orientations& orientations,
     if (auto turning = find_turning()) return *std::move(turning);
     return WithoutMap(std::move(result), "bundle adjustment found no usable map");
   }
-  progress.EndStage(std::to_string(result.map.point_in_world.size()) + " points, mean error " +
-                    std::to_string(result.bundles.front().after.mean_px) + " px, " +
-                    Describe(result.camera));
+  progress.EndStage(std::to_string(result.map.point_in_world.size()) + " points, " +
+                    DescribeMeanError(result.bundles) + ", " + DescribeRounded(result.camera));
   if (auto turning = find_turning()) return *std::move(turning);
 
   return result;
@@ -306,14 +328,15 @@ PositionResult FindPositions(const Orientations& orientations,
                     std::to_string(result.num_interpolated) + " interpolated");
 
   progress.StartStage("cloud", -1);
-  result.cloud = WithoutShallowPoints(MakeCloudOf(result, all_tracks, num_threads, options.ba),
-                                      options.cloud_min_angle_deg);
+  const Reconstruction all_points = MakeCloudOf(result, all_tracks, num_threads, options.ba);
+  result.cloud = WithoutShallowPoints(all_points, options.cloud_min_angle_deg);
+  result.num_shallow_points =
+      static_cast<int>(all_points.point_in_world.size() - result.cloud.point_in_world.size());
   const PointMap rest = WithoutOutliers(result.cloud.point_in_world, options.cloud_outliers);
   result.num_cloud_outliers = static_cast<int>(result.cloud.point_in_world.size() - rest.size());
   result.cloud.point_in_world = rest;
   std::erase_if(result.cloud.tracks, [&](const Track& track) { return !rest.contains(track.id); });
-  progress.EndStage(std::to_string(rest.size()) + " points, " +
-                    std::to_string(result.num_cloud_outliers) + " stood alone and went");
+  TellCloud(result, options.cloud_min_angle_deg, progress);
   return result;
 }
 

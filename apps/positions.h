@@ -25,6 +25,7 @@ struct PositionResult {
   KrotSolution krot;
   std::map<FrameId, PoseCovariance> pose_covariance;  // of refined keyframes, where asked for
   std::vector<BundleSummary> bundles;                 // one per component
+  int num_shallow_points = 0;                         // left the cloud: seen under too small angles
   int num_cloud_outliers = 0;                         // points that stood alone and left the cloud
   int num_resected = 0;
   int num_interpolated = 0;         // frames between keyframes whose position is interpolated

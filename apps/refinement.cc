@@ -1,6 +1,10 @@
 #include "apps/refinement.h"
 
 #include <algorithm>
+#include <array>
+#include <cstdint>
+#include <cstdio>
+#include <cstdlib>
 #include <map>
 #include <utility>
 
@@ -108,6 +112,33 @@ RefinedComponents RefineComponents(const RotationMap& cam_from_world,
     if (k != first) refine(k, seen, same_lens);
   }
   return refined;
+}
+
+double MeanErrorPx(const std::vector<BundleSummary>& bundles) {
+  std::int64_t observations = 0;
+  double sum_px = 0.0;
+  for (const BundleSummary& bundle : bundles) {
+    observations += bundle.num_observations;
+    sum_px += bundle.after.mean_px * bundle.num_observations;
+  }
+  return observations == 0 ? 0.0 : sum_px / static_cast<double>(observations);
+}
+
+std::string DescribeMeanError(const std::vector<BundleSummary>& bundles) {
+  std::array<char, 48> text = {};
+  std::snprintf(text.data(), text.size(), "mean error %.3g px", MeanErrorPx(bundles));
+  return text.data();
+}
+
+std::string DescribeRounded(Camera camera) {
+  const auto round = [](double& value) {
+    std::array<char, 32> text = {};
+    std::snprintf(text.data(), text.size(), "%.5g", value);
+    value = std::strtod(text.data(), nullptr);
+  };
+  for (double* value : {&camera.fx, &camera.fy, &camera.cx, &camera.cy}) round(*value);
+  for (double& coefficient : camera.distortion) round(coefficient);
+  return Describe(camera);
 }
 
 }  // namespace rotslam

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <set>
+#include <string>
 #include <vector>
 
 #include "ba/bundle_adjustment.h"
@@ -34,6 +35,15 @@ RefinedComponents RefineComponents(const RotationMap& cam_from_world,
                                    const std::vector<HeldStretch>& held,
                                    const Camera& camera,
                                    const BundleOptions& options);
+
+/// Mean reprojection error over the observations of all bundles; zero where there are none.
+double MeanErrorPx(const std::vector<BundleSummary>& bundles);
+
+/// "mean error 0.524 px", as MeanErrorPx gives it.
+std::string DescribeMeanError(const std::vector<BundleSummary>& bundles);
+
+/// The camera for a person to read: a refined lens is known to five digits at best.
+std::string DescribeRounded(Camera camera);
 
 /// The tracks with the bearings that `camera` gives their keypoints.
 std::vector<Track> WithBearingsOf(const Camera& camera, std::vector<Track> tracks);

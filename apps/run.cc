@@ -124,7 +124,7 @@ int Run(const RunFlags& flags) {
     progress.Warn(
         "the camera never leaves its place, so there are no positions and no points to find" +
         (turns_by_lens ? "; only the calibration makes it seem to move, it fits better as " +
-                             Describe(positions.camera)
+                             DescribeRounded(positions.camera)
                        : std::string()));
   }
   if (flags.use_report) WriteReportOfRun(directory, flags.common, progress);

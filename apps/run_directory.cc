@@ -1,11 +1,14 @@
 #include "apps/run_directory.h"
 
 #include <algorithm>
+#include <cerrno>
 #include <iterator>
 #include <map>
 #include <set>
 #include <stdexcept>
 #include <system_error>
+
+#include <unistd.h>
 
 #include "apps/focal_guess.h"
 #include "apps/unfinished.h"
@@ -138,6 +141,10 @@ std::filesystem::path PrepareRunDirectory(const std::string& out) {
   if (error || !std::filesystem::is_directory(directory)) {
     throw std::runtime_error(out + ": cannot make this folder for the results: " +
                              (error ? error.message() : "a file of that name is in the way"));
+  }
+  if (access(directory.c_str(), W_OK) != 0) {
+    throw std::runtime_error(
+        out + ": cannot write into this folder: " + std::generic_category().message(errno));
   }
   const std::filesystem::path probe = directory / ".write_test";
   ReplaceFile(probe, "");
@@ -310,6 +317,7 @@ void AddPositions(const PositionResult& positions, const Camera& camera, RunSumm
   summary.counts.push_back({"keyframes", count(positions.keyframes.size())});
   summary.counts.push_back({"map_points", count(positions.map.point_in_world.size())});
   summary.counts.push_back({"points", count(positions.cloud.point_in_world.size())});
+  summary.counts.push_back({"shallow_points", std::int64_t{positions.num_shallow_points}});
   summary.counts.push_back({"cloud_outliers", std::int64_t{positions.num_cloud_outliers}});
   summary.counts.push_back({"components", count(positions.components.size())});
   summary.counts.push_back({"resected_frames", std::int64_t{positions.num_resected}});
@@ -345,20 +353,18 @@ void AddBundles(const std::vector<BundleSummary>& bundles,
                 RunSummary& summary) {
   if (bundles.empty()) return;
 
-  // Sums over the components; means are weighted by their observations.
+  // Sums over the components.
   std::int64_t observations = 0;
   std::int64_t dropped = 0;
   std::int64_t iterations = 0;
   double initial_cost = 0.0;
   double final_cost = 0.0;
-  double error_sum_px = 0.0;
   for (const BundleSummary& bundle : bundles) {
     observations += bundle.num_observations;
     dropped += bundle.num_dropped_observations;
     iterations += bundle.iterations;
     initial_cost += bundle.initial_cost;
     final_cost += bundle.final_cost;
-    error_sum_px += bundle.after.mean_px * bundle.num_observations;
   }
   const BundleSummary& largest = *std::max_element(
       bundles.begin(), bundles.end(), [](const BundleSummary& a, const BundleSummary& b) {
@@ -369,7 +375,7 @@ void AddBundles(const std::vector<BundleSummary>& bundles,
                             {"iterations", iterations},
                             {"initial_cost", initial_cost},
                             {"final_cost", final_cost},
-                            {"mean_error_px", error_sum_px / static_cast<double>(observations)},
+                            {"mean_error_px", MeanErrorPx(bundles)},
                             {"median_error_px", largest.after.median_px},
                             {"p90_error_px", largest.after.p90_px},
                             {"lens.gain", largest.lens_gain},

@@ -216,8 +216,8 @@ int Solve(const SolveFlags& flags) {
   }
   const BundleSummary& largest = refined.bundles[order.front()].summary;
   progress.EndStage(std::to_string(largest.num_frames) + " views, " +
-                    std::to_string(largest.num_points) + " points, mean error " +
-                    std::to_string(largest.after.mean_px) + " px");
+                    std::to_string(largest.num_points) + " points, " +
+                    DescribeMeanError({largest}));
 
   WriteComponents(directory, input, refined, order);
   WriteRemoved(directory / "removed.csv", input, krot, refined.bundles);

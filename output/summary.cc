@@ -42,6 +42,7 @@ Json CameraToJson(const Camera& camera) {
                  {"cx", camera.cx},
                  {"cy", camera.cy}};
   if (camera.model != CameraModel::kPinhole) object["distortion"] = camera.distortion;
+  if (camera.readout_s != 0.0) object["readout_s"] = camera.readout_s;
   return object;
 }
 

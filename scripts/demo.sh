@@ -19,10 +19,14 @@ result=runs/demo/result
 truth=$sequence/groundtruth_tum.txt
 summary=$result/summary.json
 
-if [[ ! $truth -nt $rotslam ]]; then
+if [[ $truth -nt $rotslam ]]; then
+  echo "kept: $sequence, newer than the program"
+else
   "$rotslam" simulate gimbal --out "$sequence"
 fi
-if [[ ! $summary -nt $truth ]]; then
+if [[ $summary -nt $truth ]]; then
+  echo "kept: $result, newer than the sequence"
+else
   "$rotslam" run "$sequence" --camera "$sequence/camera.yaml" --out "$result"
 fi
 
@@ -35,3 +39,4 @@ echo "written:"
 printf '%s\n' "$PWD/$result"/*
 echo
 echo "to look at it, open in a browser: $PWD/$result/report.html"
+echo "what it means: docs/tutorial.md; a video of your own: docs/own_video.md"

@@ -57,6 +57,16 @@ if [[ $(id -u) -ne 0 ]]; then
   as_root=(sudo)
 fi
 echo "installing: ${missing[*]}"
-"${as_root[@]}" apt-get update -qq
-"${as_root[@]}" env DEBIAN_FRONTEND=noninteractive \
-  apt-get install -qq -y --no-install-recommends "${missing[@]}"
+log=$(mktemp --tmpdir rotslam_packages.XXXXXX.log)
+echo "what apt-get says goes to $log"
+status=0
+{
+  "${as_root[@]}" apt-get update -qq &&
+    "${as_root[@]}" env DEBIAN_FRONTEND=noninteractive \
+      apt-get install -qq -y --no-install-recommends "${missing[@]}"
+} >"$log" 2>&1 || status=$?
+if [[ $status -ne 0 ]]; then
+  tail -n 20 "$log" >&2
+  echo "${0##*/}: apt-get failed; all it said is in $log" >&2
+  exit "$status"
+fi

@@ -64,7 +64,7 @@ class ListReader {
         entry.name.starts_with('.') || entry.name.starts_with('-')) {
       Refuse(node,
              "\"" + entry.name +
-                 "\" cannot name a folder of results: give a `name` of letters, digits, '.', '_' "
+                 "\" cannot name a folder of results: give a `name` of a-z, A-Z, 0-9, '.', '_' "
                  "and '-' that begins with a letter or digit");
     }
     if (entry.command != "run" && entry.command != "rotations") {

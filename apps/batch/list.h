@@ -39,7 +39,7 @@ struct BatchEntry {
 
 /// Reads the sequences of a batch:
 ///   - path: kitti/sequences/00         # folder or video; the one key that must be there
-///     name: kitti00                    # letters, digits, . _ -; left out: the last part of path
+///     name: kitti00                    # a-z, A-Z, 0-9, . _ -; left out: the last part of path
 ///     command: rotations               # left out: run
 ///     camera: calib.txt                # left out: the calibration that lies with the images
 ///     ground_truth: kitti/poses/00.txt # left out: what lies with the images

@@ -90,6 +90,14 @@ function whole(value) {
   return value === null || value === undefined ? '–' : value.toLocaleString('en-GB');
 }
 
+function counted(value, noun) { return whole(value) + ' ' + noun + (value === 1 ? '' : 's'); }
+
+function everyNth(step, noun) {
+  if (step === 1) return 'every ' + noun;
+  const isTeen = Math.floor(step % 100 / 10) === 1;
+  return `every ${step}${(!isTeen && {1: 'st', 2: 'nd', 3: 'rd'}[step % 10]) || 'th'} ${noun}`;
+}
+
 // The one frame that slider, view, charts and picture show; whoever shows it listens.
 const listeners = [];
 let current = 0;

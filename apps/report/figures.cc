@@ -25,6 +25,9 @@ constexpr double kLeft = 52.0;
 constexpr double kPlotWidth = kWidth - kLeft - 12.0;
 constexpr double kNaN = std::numeric_limits<double>::quiet_NaN();
 
+constexpr Stroke kMeasured = {kBlue, 1.4};
+constexpr Stroke kLoose = {kBlue, 1.4, 2.5};
+
 struct LegendEntry {
   std::string text;
   Stroke stroke;
@@ -35,7 +38,7 @@ void DrawLegend(const std::vector<LegendEntry>& entries, Drawing& drawing) {
   for (const LegendEntry& entry : entries) {
     drawing.AddLine({{x, 12.0}, {x + 22.0, 12.0}}, entry.stroke);
     drawing.AddText({x + 26.0, 15.0}, entry.text, {TextAnchor::kStart, 9.0, false, false, kInk});
-    x += 46.0 + 4.9 * static_cast<double>(entry.text.size());
+    x += 38.0 + 4.6 * static_cast<double>(entry.text.size());
   }
 }
 
@@ -59,6 +62,29 @@ Eigen::Matrix3d LevelFromWorld(const Trajectory& poses) {
 }
 
 bool IsHeld(const Segment& segment) { return segment.kind != "translating"; }
+
+bool IsLoose(const Segment& segment) { return segment.scale == "continuity"; }
+
+// The estimate's line, dashed where nothing measures the scale.
+void DrawEstimate(const RunData& run,
+                  const std::vector<Eigen::Vector2d>& estimate,
+                  const Axes& axes,
+                  Drawing& drawing) {
+  std::vector<bool> is_loose(estimate.size(), false);
+  for (const Segment& segment : run.segments) {
+    if (!IsLoose(segment)) continue;
+    const int end = std::min(segment.last_frame + 1, static_cast<int>(estimate.size()));
+    for (int n = std::max(0, segment.first_frame); n < end; ++n) is_loose[n] = true;
+  }
+  for (std::size_t first = 0; first + 1 < estimate.size();) {
+    std::size_t last = first + 1;
+    while (last + 1 < estimate.size() && is_loose[last] == is_loose[first]) ++last;
+    axes.DrawLine({estimate.begin() + first, estimate.begin() + last + 1},
+                  is_loose[first] ? kLoose : kMeasured,
+                  drawing);
+    first = last;
+  }
+}
 
 struct Paths {
   std::vector<Eigen::Vector3d> estimate;
@@ -100,7 +126,8 @@ std::vector<Eigen::Vector2d> Projected(const std::vector<Eigen::Vector3d>& point
 }
 
 // The path decides what is shown, and as much of the cloud around it as lies near.
-void DrawMap(const RunData& run,
+// @return  whether any of the cloud does.
+bool DrawMap(const RunData& run,
              const Paths& paths,
              std::array<int, 2> axes_of_map,
              const std::array<std::string, 2>& labels,
@@ -121,8 +148,9 @@ void DrawMap(const RunData& run,
   for (const Eigen::Vector2d& point : Projected(paths.cloud, across, up)) {
     if (axes.Contains(point)) dots.push_back(axes.OnPage(point));
   }
+  const bool has_dots = !dots.empty();
   drawing.AddDots(std::move(dots), 0.7, kCloud);
-  axes.DrawLine(estimate, {kBlue, 1.4}, drawing);
+  DrawEstimate(run, estimate, axes, drawing);
   axes.DrawLine(truth, {kTruth, 1.0, 3.5}, drawing);
   std::vector<Eigen::Vector2d> held;
   for (const Segment& segment : run.segments) {
@@ -130,30 +158,34 @@ void DrawMap(const RunData& run,
     held.push_back(axes.OnPage(estimate[segment.first_frame]));
   }
   drawing.AddDots(std::move(held), 5.0, kOrange);
+  return has_dots;
 }
 
 Drawing TrajectoryFigure(const RunData& run) {
   Drawing drawing(kWidth, 560.0);
   const Paths paths = LevelPaths(run);
-  std::vector<LegendEntry> legend = {{"estimate", {kBlue, 1.4}}};
+  const bool has_dots_above = DrawMap(run,
+                                      paths,
+                                      {0, 1},
+                                      {"right", "forward, from above"},
+                                      Axes({kLeft, 24.0, kPlotWidth, 320.0}),
+                                      drawing);
+  const bool has_dots_aside = DrawMap(run,
+                                      paths,
+                                      {1, 2},
+                                      {"forward", "up, from the side"},
+                                      Axes({kLeft, 384.0, kPlotWidth, 138.0}),
+                                      drawing);
+  std::vector<LegendEntry> legend = {{"estimate", kMeasured}};
+  if (std::any_of(run.segments.begin(), run.segments.end(), IsLoose)) {
+    legend.push_back({"scale assumed", kLoose});
+  }
   if (!paths.truth.empty()) legend.push_back({"ground truth", {kTruth, 1.0, 3.5}});
   if (std::any_of(run.segments.begin(), run.segments.end(), IsHeld)) {
-    legend.push_back({"turning in place, or at rest", {kOrange, 5.0}});
+    legend.push_back({"turning or at rest", {kOrange, 5.0}});
   }
-  legend.push_back({"points", {kCloud, 2.0}});
+  if (has_dots_above || has_dots_aside) legend.push_back({"points", {kCloud, 2.0}});
   DrawLegend(legend, drawing);
-  DrawMap(run,
-          paths,
-          {0, 1},
-          {"right", "forward, from above"},
-          Axes({kLeft, 24.0, kPlotWidth, 320.0}),
-          drawing);
-  DrawMap(run,
-          paths,
-          {1, 2},
-          {"forward", "up, from the side"},
-          Axes({kLeft, 384.0, kPlotWidth, 138.0}),
-          drawing);
   return drawing;
 }
 
@@ -291,7 +323,9 @@ Drawing RuntimeFigure(const RunData& run) {
   constexpr double kRow = 17.0;
   constexpr double kNameWidth = 128.0;
   Drawing drawing(kWidth, 48.0 + kRow * static_cast<double>(stages.size()));
-  drawing.AddText({8.0, 18.0}, "seconds per stage", {TextAnchor::kStart, 10.0, false, true, kInk});
+  drawing.AddText({8.0, 18.0},
+                  "seconds per stage; lighter: parts of stages; lightest: of bundle adjustment",
+                  {TextAnchor::kStart, 10.0, false, true, kInk});
   double longest = 1e-9;
   for (const auto& [name, seconds] : stages) longest = std::max(longest, seconds);
   double y = 32.0;
@@ -303,7 +337,8 @@ Drawing RuntimeFigure(const RunData& run) {
     const bool is_whole =
         name == "total" || name == "focal guess" || name == "orientations" || name == "positions";
     Color color = kBlue;
-    if (!is_whole) color.opacity = 0.55;
+    const bool is_round = name.starts_with("bundle ") && name != "bundle adjustment";
+    if (!is_whole) color.opacity = is_round ? 0.25 : 0.55;
     drawing.AddArea({{kNameWidth, y + 2.0},
                      {kNameWidth + length, y + 2.0},
                      {kNameWidth + length, y + 12.0},

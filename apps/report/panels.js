@@ -74,7 +74,7 @@ function buildNotes() {
   const warn = (text) => $('notes').append(h('div', {class: 'note warning'}, text));
   if (!hasPositions) {
     note(summary.command === 'rotations' ?
-      'Orientations only: `rotslam rotations` finds no positions. The view shows where the camera looked.' :
+      'Orientations only: rotslam rotations finds no positions. The view shows where the camera looked.' :
       'There are no positions: the camera never leaves its place, or no map was found. The view shows where the camera looked.');
   }
   if (summary.interrupted) note('The run was interrupted: this is what it had found by then.');
@@ -88,15 +88,22 @@ function buildNotes() {
     warn(`The camera turns in place only if its focal length is ${significant(calibration.refined_px, 5)} px, ` +
       `not ${significant(calibration.given_px, 5)} px as its calibration says; what is shown rests on that.`);
   }
-  if (counts.unreadable_frames) note(whole(counts.unreadable_frames) + ' frames could not be read.');
+  if (counts.unreadable_frames) note(counted(counts.unreadable_frames, 'frame') + ' could not be read.');
   if (counts.frames_without_edge) {
-    note(whole(counts.frames_without_edge) +
-      ' frames match no other frame; their orientation is interpolated (red ticks below the curves).');
+    note(counted(counts.frames_without_edge, 'frame') + (counts.frames_without_edge === 1 ? ' matches' : ' match') +
+      ' no other frame; the orientation there is interpolated (red ticks below the curves).');
   }
   if (counts.breaks) {
-    note(whole(counts.breaks) + ' times nothing matches what came before: the orientation across is extrapolated (red ticks).');
+    note(counted(counts.breaks, 'time') + ' nothing matches what came before: the orientation across is extrapolated (red ticks).');
   }
-  if (counts.interpolated_frames) note('The positions of ' + whole(counts.interpolated_frames) + ' frames are interpolated.');
+  if (counts.interpolated_frames) {
+    note(counted(counts.interpolated_frames, 'position') + (counts.interpolated_frames === 1 ? ' is' : ' are') +
+      ' interpolated between frames.');
+  }
+  const allPoints = counts.points + counts.shallow_points + counts.cloud_outliers;
+  if (hasPositions && allPoints > 0 && 2 * counts.points < allPoints) {
+    note(`The cloud holds ${whole(counts.points)} of ${whole(allPoints)} points: the camera has moved too little for more.`);
+  }
   for (const segment of data.segments) {
     if (segment.scale !== 'continuity') continue;
     note(`Frames ${segment.first} to ${segment.last}: nothing measures the scale of this part of the map; ` +
@@ -106,7 +113,7 @@ function buildNotes() {
     note('Known rotation: ' + summary.krot.status + (summary.krot.message ? ', ' + summary.krot.message : ''));
   }
   if (data.truth_problem) note('No comparison with the ground truth: ' + data.truth_problem);
-  if (data.frame_step > 1) note(`Every ${data.frame_step}th frame is shown.`);
+  if (data.frame_step > 1) note(`Shown is ${everyNth(data.frame_step, 'frame')}.`);
 }
 
 function buildCharts(parent) {
@@ -317,8 +324,9 @@ function buildLoops(parent) {
   const rows = accepted.slice(0, 300).map((loop) => [loop.frame, loop.match, whole(loop.inliers), fixed(loop.angle_deg, 2)]
     .map((cell) => number(cell)));
   const element = panel(parent, 'Loops',
-    h('p', {class: 'lead'}, `${accepted.length} of ${data.loops.candidates} places that looked alike were accepted` +
-      (accepted.length > 300 ? '; the first 300:' : '.')));
+    h('p', {class: 'lead'}, data.loops.candidates === 0 ? 'No place looked like an older one.' :
+      `${accepted.length} of ${counted(data.loops.candidates, 'place')} that looked like older ones ` +
+      (accepted.length === 1 ? 'was' : 'were') + ' accepted' + (accepted.length > 300 ? '; the first 300:' : '.')));
   if (rows.length > 0) {
     element.append(h('div', {class: 'scroll'}, table(rows, ['frame', 'sees that of', 'matches', 'angle around, deg'].map(number))));
   }
@@ -505,7 +513,8 @@ function buildView() {
   const marks = [];
   for (const [name, {label, colorName, shown}] of Object.entries(scene.layers)) {
     const mark = h('i', {});
-    marks.push([mark, colorName]);
+    if (name === 'cloud') mark.className = 'colourful';
+    else marks.push([mark, colorName]);
     legend.append(h('span', {}, mark, label));
     if (name === 'marker') continue;
     const box = h('input', {type: 'checkbox'});
@@ -536,8 +545,8 @@ for (const build of [buildCharts, buildAccuracy, buildKrot, buildSegments, build
   buildOptions, buildFiles]) {
   build($('panels'));
 }
-$('foot').textContent = 'Drag in the view turns it, the right button moves it, the wheel comes nearer. ' +
-  'In the curves a click goes to the frame, dragging zooms in, a double click shows all.';
+$('view-hint').textContent = 'Dragging turns the view, the right button moves it, the wheel comes nearer.';
+$('foot').textContent = 'In the curves a click goes to the frame, dragging zooms in, a double click shows all.';
 
 function redrawAll() {
   colors.clear();

@@ -219,7 +219,7 @@ class Scene {
     this.frustumSize = hasPositions ?
       Math.min(0.05 * this.pathSize, Math.max(0.8 * keyframes.frustum_size, 0.012 * this.pathSize)) : 0.95;
     const positions = places.flatMap((place) => this.frustumLines(place, this.frustumSize));
-    this.layer('frusta', hasPositions ? 'keyframes' : `every ${few}th view`, 'green', this.lines(positions, 0.55),
+    this.layer('frusta', hasPositions ? 'keyframes' : everyNth(few, 'view'), 'green', this.lines(positions, 0.55),
       hasPositions);
   }
 
@@ -276,7 +276,8 @@ class Scene {
     this.camera.aspect = width / height;
     this.camera.updateProjectionMatrix();
     if (!this.touched) this.look();
-    this.drawSoon();
+    // The new size has emptied the canvas.
+    this.draw();
   }
 
   // From behind the cameras and above, just far enough to see all that shall be shown.

@@ -9,6 +9,7 @@
 #include <gtest/gtest.h>
 #include <opencv2/core.hpp>
 #include <opencv2/imgcodecs.hpp>
+#include <opencv2/videoio.hpp>
 
 #include "tests/apps/small_sequence.h"
 
@@ -18,6 +19,7 @@ namespace {
 namespace fs = std::filesystem;
 using testing::AllOf;
 using testing::Contains;
+using testing::ContainsRegex;
 using testing::Each;
 using testing::ElementsAre;
 using testing::EndsWith;
@@ -89,6 +91,30 @@ TEST_F(BadInput, NoSequence) {
   EXPECT_THAT(Refusal(Run(Images(Good()).front())), HasSubstr("give the folder"));
   folder_.Write("film.mp4", "no film");
   EXPECT_THAT(Refusal(Run(folder_.path() / "film.mp4")), HasSubstr("film.mp4: not a video"));
+}
+
+TEST_F(BadInput, AVideoThatWasCutOff) {
+  const std::string whole = (folder_.path() / "whole.avi").string();
+  {
+    cv::VideoWriter writer(
+        whole, cv::VideoWriter::fourcc('M', 'J', 'P', 'G'), 30.0, cv::Size(320, 240));
+    if (!writer.isOpened()) GTEST_SKIP() << "OpenCV here writes no MJPG video";
+    for (const fs::path& image : Images(Good())) writer.write(cv::imread(image.string()));
+  }
+  const auto rotations = [&](const std::string& video) {
+    return Rotslam({"rotations",
+                    video,
+                    "--camera=" + (Good() / "camera.yaml").string(),
+                    "--out=" + Out().string(),
+                    "--no-report",
+                    "--quiet"});
+  };
+  EXPECT_EQ(rotations(whole).error, "");
+  const std::string bytes = ReadWholeFile(whole);
+  const std::string part = folder_.Write("part.avi", bytes.substr(0, bytes.size() / 2)).string();
+  EXPECT_THAT(rotations(part).error,
+              ContainsRegex("^rotslam: warning: the video ends after 1[0-9] of the 24 frames it "
+                            "announces; is the file complete\\?\n$"));
 }
 
 TEST_F(BadInput, ListsWithFaults) {
@@ -221,7 +247,7 @@ TEST_F(BadInput, Permissions) {
   fs::create_directory(read_only);
   fs::permissions(read_only, fs::perms(0555));
   EXPECT_THAT(Refusal(run(sequence, read_only, camera)),
-              AllOf(StartsWith(read_only.string()), HasSubstr("Permission denied")));
+              AllOf(StartsWith(read_only.string() + ": "), HasSubstr("Permission denied")));
   EXPECT_THAT(Refusal(run(sequence, read_only / "below", camera)),
               AllOf(StartsWith(read_only.string()), HasSubstr("Permission denied")));
 
@@ -289,6 +315,14 @@ TEST_F(BadInput, PicturesWithoutCorners) {
   }
 }
 
+TEST_F(BadInput, TooFewFramesOfACameraThatHardlyMoves) {
+  const std::string config =
+      folder_.Write("far.yaml", "keyframes: {min_parallax_deg: 30, min_keyframes: 2}\n").string();
+  const CommandResult result = Run(Good(), {"--last=9", "--config=" + config});
+  EXPECT_EQ(result.exit_code, 1);
+  EXPECT_THAT(result.error, HasSubstr("moves too little in these 10 frames, give more of them"));
+}
+
 TEST_F(BadInput, ATinyPicture) {
   for (int k = 0; k < 4; ++k) {
     const std::string file = (folder_.path() / (std::to_string(k) + ".png")).string();
@@ -309,6 +343,7 @@ TEST_F(BadInput, ProgressIsPlainLinesOnStandardError) {
   EXPECT_THAT(lines, Contains(AllOf(StartsWith("input: "), HasSubstr("24 frames"))));
   EXPECT_THAT(lines, Contains(AllOf(StartsWith("camera: pinhole, fx "), HasSubstr("320x240"))));
   EXPECT_THAT(lines, Contains(StartsWith("orientations: 24 frames")));
+  ASSERT_FALSE(lines.empty());
   EXPECT_THAT(lines.back(), StartsWith("wrote "));
   fs::remove_all(Out());
   const CommandResult quiet = Run(Good());
@@ -317,6 +352,7 @@ TEST_F(BadInput, ProgressIsPlainLinesOnStandardError) {
 }
 
 TEST_F(BadInput, TheLineOnATerminalIsRenewedAndTakenAway) {
+  if (!HasTerminals()) GTEST_SKIP() << "needs a terminal (/dev/pts)";
   const CommandResult result =
       RotslamOnTerminal({"run", Good().string(), "--out=" + Out().string()}, 40);
   EXPECT_EQ(result.exit_code, 0);
@@ -336,6 +372,7 @@ TEST_F(BadInput, TheLineOnATerminalIsRenewedAndTakenAway) {
   const std::vector<std::string> shown = ShownLines(result.output);
   EXPECT_THAT(shown, Each(Not(HasSubstr("ETA"))));
   EXPECT_THAT(shown, Contains(StartsWith("orientations: 24 frames")));
+  ASSERT_FALSE(shown.empty());
   EXPECT_THAT(shown.back(), StartsWith("wrote "));
   const CommandResult quiet =
       RotslamOnTerminal({"run", Good().string(), "--out=" + Out().string(), "--quiet"}, 80);
@@ -343,6 +380,7 @@ TEST_F(BadInput, TheLineOnATerminalIsRenewedAndTakenAway) {
 }
 
 TEST_F(BadInput, AnErrorOnATerminalHasALineOfItsOwn) {
+  if (!HasTerminals()) GTEST_SKIP() << "needs a terminal (/dev/pts)";
   for (int k = 0; k < 20; ++k) {
     const std::string file = (folder_.path() / (std::to_string(k) + ".png")).string();
     ASSERT_TRUE(cv::imwrite(file, cv::Mat(960, 1280, CV_8UC1, cv::Scalar::all(0))));

@@ -47,6 +47,7 @@ TEST_F(BatchList, NamesLineAndReason) {
   EXPECT_THAT(Refusal("- path: x/a\n- path: y/a\n"), HasSubstr("the name \"a\" is taken"));
   EXPECT_THAT(Refusal("- path: a\n  name: ../b\n"), HasSubstr("cannot name a folder"));
   EXPECT_THAT(Refusal("- path: a\n  name: --out\n"), HasSubstr("cannot name a folder"));
+  EXPECT_THAT(Refusal("- path: a\n  name: k\u00fcche\n"), HasSubstr("a-z, A-Z, 0-9"));
   EXPECT_THAT(Refusal("- path: a\n  config: none.yaml\n"), HasSubstr("cannot read the options"));
   EXPECT_THAT(Refusal("- path: [a\n"), HasSubstr("not YAML"));
 }

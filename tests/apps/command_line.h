@@ -2,8 +2,11 @@
 
 #include <algorithm>
 #include <array>
+#include <cerrno>
 #include <cstdlib>
+#include <cstring>
 #include <filesystem>
+#include <stdexcept>
 #include <string>
 #include <vector>
 
@@ -63,6 +66,16 @@ inline CommandResult Rotslam(std::vector<std::string> arguments,
   return Rotslam(arguments);
 }
 
+/// Whether this machine gives programs a terminal of their own; some containers have none.
+inline bool HasTerminals() {
+  int terminal = -1;
+  int other_side = -1;
+  if (openpty(&terminal, &other_side, nullptr, nullptr, nullptr) != 0) return false;
+  close(terminal);
+  close(other_side);
+  return true;
+}
+
 /// The same on a terminal of its own, of so many columns; everything printed is in `output`.
 /// @param environment  what it has of it besides the test's, "NAME=value".
 inline CommandResult RotslamOnTerminal(const std::vector<std::string>& arguments,
@@ -78,6 +91,9 @@ inline CommandResult RotslamOnTerminal(const std::vector<std::string>& arguments
   size.ws_col = static_cast<unsigned short>(columns);
   int terminal = -1;
   const pid_t child = forkpty(&terminal, nullptr, nullptr, &size);
+  if (child < 0) {
+    throw std::runtime_error(std::string("no terminal can be opened: ") + std::strerror(errno));
+  }
   if (child == 0) {
     for (std::string& variable : environment) putenv(variable.data());
     execv(argv[0], argv.data());

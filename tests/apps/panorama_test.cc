@@ -121,6 +121,12 @@ TEST_F(PanoramaCommand, SaysWhatIsWrongInOneLine) {
   EXPECT_THAT(error(Out("turn").string(), {"--first=90"}), HasSubstr("frames 0 to 39"));
   EXPECT_THAT(error(Out("turn").string(), {"--sequence=gone"}), HasSubstr("gone"));
   EXPECT_THAT(error(Out("turn").string(), {"--width=7"}), HasSubstr("width"));
+  const TemporaryFolder folder;
+  fs::copy(Out("turn"), folder.path(), fs::copy_options::recursive);
+  nlohmann::ordered_json summary = ReadSummary(folder.path());
+  summary["camera"]["readout_s"] = -1.0;
+  folder.Write("summary.json", summary.dump());
+  EXPECT_THAT(error(folder.path().string(), {}), HasSubstr("readout_s"));
 }
 
 TEST_F(PanoramaCommand, ACameraAtRestStandsStill) {

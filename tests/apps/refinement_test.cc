@@ -6,6 +6,7 @@
 #include <cmath>
 #include <string>
 
+#include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
 #include "tests/scenes/alignment.h"
@@ -111,6 +112,25 @@ TEST_P(ChainWithOutliers, RemovesThemAndKeepsTheRest) {
     EXPECT_GE(kept.inliers, 0.98) << seed;
     EXPECT_LE(ErrorOf(with, dirty), 1.5 * ErrorOf(SolveChain(clean, "l1"), clean)) << seed;
   }
+}
+
+TEST(MeanError, CountsEveryObservationOnce) {
+  BundleSummary large;
+  large.num_observations = 300;
+  large.after.mean_px = 0.5;
+  BundleSummary small;
+  small.num_observations = 100;
+  small.after.mean_px = 0.1;
+  EXPECT_NEAR(MeanErrorPx({small, large}), 0.4, 1e-12);
+  EXPECT_EQ(MeanErrorPx({}), 0.0);
+  EXPECT_EQ(DescribeMeanError({small, large}), "mean error 0.4 px");
+}
+
+TEST(DescribeRounded, KeepsFiveDigits) {
+  Camera camera;
+  camera.fx = 502.2993847;
+  camera.fy = 1489.44449;
+  EXPECT_THAT(DescribeRounded(camera), testing::HasSubstr("fx 502.3, fy 1489.4,"));
 }
 
 }  // namespace

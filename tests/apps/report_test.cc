@@ -377,7 +377,15 @@ TEST_F(Report, FiguresAreDrawnTwice) {
     EXPECT_GT(cv::countNonZero(ink), 300);
   }
   EXPECT_THAT(names, ElementsAre("trajectory", "orientation", "errors", "runtime"));
-  EXPECT_THAT(figures[0].drawing.Svg(), HasSubstr(">forward, from above</text>"));
+  EXPECT_THAT(figures[0].drawing.Svg(),
+              testing::AllOf(HasSubstr(">forward, from above</text>"),
+                             HasSubstr(">scale assumed</text>"),
+                             HasSubstr(">points</text>")));
+  run.cloud.reset();
+  for (Segment& segment : run.segments) segment.scale = "reference";
+  EXPECT_THAT(MakeFigures(run)[0].drawing.Svg(),
+              testing::AllOf(testing::Not(HasSubstr(">scale assumed</text>")),
+                             testing::Not(HasSubstr(">points</text>"))));
   EXPECT_THAT(figures[1].drawing.Svg(),
               testing::AllOf(HasSubstr(">roll, deg</text>"), HasSubstr(">time, s</text>")));
   EXPECT_THAT(figures[2].drawing.Svg(), HasSubstr(">position, m</text>"));

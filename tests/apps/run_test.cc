@@ -20,6 +20,7 @@ namespace {
 namespace fs = std::filesystem;
 using testing::ElementsAre;
 using testing::HasSubstr;
+using testing::Not;
 
 constexpr std::size_t kNumFrames = 60;
 
@@ -265,6 +266,29 @@ TEST_F(RunCommand, HandheldPositionsAreThoseOfTheCamera) {
   ASSERT_TRUE(metrics.ate_m.has_value());
   // 0.16 % of the way.
   EXPECT_LT(*metrics.ate_m, 0.006 * metrics.path_length_m);
+}
+
+TEST_F(RunCommand, SaysWhyThereAreFewPoints) {
+  EXPECT_THAT(Said("handheld"), Not(HasSubstr("too little")));
+  const TemporaryFolder folder;
+  const CommandResult result = Rotslam({"run",
+                                        Sequence("handheld").string(),
+                                        "--last=4",
+                                        "--no-report",
+                                        "--out=" + folder.path().string()});
+  ASSERT_EQ(result.exit_code, 0) << result.error;
+  const auto counts = ReadSummary(folder.path())["counts"];
+  const auto points = counts["points"].get<std::int64_t>();
+  const auto shallow = counts["shallow_points"].get<std::int64_t>();
+  const auto alone = counts["cloud_outliers"].get<std::int64_t>();
+  EXPECT_GT(shallow, points);
+  EXPECT_THAT(result.error,
+              HasSubstr("cloud: " + std::to_string(points) + " points; " + std::to_string(shallow) +
+                        " seen under less than 2 deg and " + std::to_string(alone) + " that"));
+  EXPECT_THAT(
+      result.error,
+      HasSubstr("warning: the cloud holds " + std::to_string(points) + " of " +
+                std::to_string(points + shallow + alone) + " points: the camera has moved"));
 }
 
 // Part of a trajectory as a metric sees it.

@@ -88,6 +88,7 @@ TEST_F(Terminal, ALogThatCannotBeWrittenIsRefused) {
 }
 
 TEST_F(Terminal, ColoursOnlyWhereTheyAreWelcome) {
+  if (!HasTerminals()) GTEST_SKIP() << "needs a terminal (/dev/pts)";
   const fs::path sequence = Copy();
   fs::remove(Images(sequence)[10]);
   const std::vector<std::string> arguments = {
@@ -109,6 +110,7 @@ TEST_F(Terminal, ColoursOnlyWhereTheyAreWelcome) {
 }
 
 TEST_F(Terminal, TheRenewedLineShowsFiguresAndCountersAsFarAsThereIsRoom) {
+  if (!HasTerminals()) GTEST_SKIP() << "needs a terminal (/dev/pts)";
   const auto renewed = [&](int columns) {
     std::vector<std::string> lines;
     const std::string output = RotslamOnTerminal(Rotations(), columns).output;

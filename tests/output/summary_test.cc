@@ -89,6 +89,14 @@ TEST(Summary, HoldsTheDocumentedKeys) {
   EXPECT_EQ(json["version"], Version());
 }
 
+TEST(Summary, TellsOfARollingShutter) {
+  RunSummary summary;
+  summary.camera = Camera{};
+  EXPECT_FALSE(nlohmann::json::parse(SummaryJson(summary))["camera"].contains("readout_s"));
+  summary.camera->readout_s = 0.018;
+  EXPECT_EQ(nlohmann::json::parse(SummaryJson(summary))["camera"]["readout_s"], 0.018);
+}
+
 TEST(Summary, LeavesOutWhatDidNotRun) {
   const auto json = nlohmann::json::parse(SummaryJson({}));
   for (const char* key : {"krot", "ba", "segments", "loops", "camera"}) {
