@@ -149,7 +149,7 @@ class VideoSequence : public Sequence {
     constexpr int kProbedFrames = 10;
     cv::VideoCapture capture(place_.string(), VideoBackEnd());
     if (!capture.isOpened()) {
-      throw std::runtime_error(place_.string() + ": not a video that OpenCV can open");
+      throw std::runtime_error(place_.string() + ": not a video that OpenCV can open, or cut off");
     }
     double previous_ms = -1.0;
     for (int k = 0; k < kProbedFrames && capture.grab(); ++k) {
