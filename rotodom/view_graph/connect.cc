@@ -168,11 +168,13 @@ std::vector<Connection> ConnectView(const Features& view,
   std::erase_if(hypotheses,
                 [](const ConnectionHypotheses& of_pair) { return of_pair.connections.empty(); });
   std::vector<PairHypotheses> orientations;
+  orientations.reserve(hypotheses.size());
   for (const ConnectionHypotheses& of_pair : hypotheses) {
     orientations.push_back(OrientationsBy(of_pair, predicted_cam_from_world));
   }
   const std::vector<int> chosen = ChooseConsistent(orientations);
   std::vector<Connection> found;
+  found.reserve(hypotheses.size());
   for (std::size_t k = 0; k < hypotheses.size(); ++k) {
     found.push_back(std::move(hypotheses[k].connections[chosen[k]]));
   }
