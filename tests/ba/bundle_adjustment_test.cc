@@ -334,6 +334,24 @@ TEST(RefineBundle, LeavesAGoodCalibrationToTheLastBit) {
   }
 }
 
+// What a rectified camera may have left: one pixel at the image's side.
+TEST(RefineBundle, RefinesAWeakDistortion) {
+  Camera lens = BaCamera(CameraModel::kRadtan);
+  lens.distortion = {0.01, 0.0, 0.0, 0.0, 0.0};
+  BaScene scene =
+      MakeBaScene({.num_frames = 40, .num_points = 1500, .noise_px = 0.5, .camera = lens});
+  scene.camera = BaCamera();
+  const BundleProblem problem = PerturbedProblem(scene, 0.1, 0.5);
+  BundleOptions options;
+  const BundleResult refined = RefineBundle(problem, options);
+  options.lens.refine_distortion = false;
+  const BundleResult held = RefineBundle(problem, options);
+  ASSERT_TRUE(refined.Usable() && held.Usable());
+  ASSERT_TRUE(refined.summary.lens_refined) << refined.summary.lens_gain;
+  EXPECT_LT(CenterError(refined.reconstruction, scene.truth),
+            0.8 * CenterError(held.reconstruction, scene.truth));
+}
+
 // Squared errors in units of the stated covariance, per degree of freedom, over many noises.
 double NormalisedErrors(const BaSceneOptions& street, const BundleOptions& options) {
   double sum = 0.0;
