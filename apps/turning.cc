@@ -1,12 +1,15 @@
 #include "apps/turning.h"
 
 #include <algorithm>
+#include <cmath>
 
 namespace rotslam {
 namespace {
 
 // Tracks that tell whether it is worth while to look at all of them.
 constexpr std::size_t kSampledTracks = 2000;
+// Smallest mean square of residuals, in sigmas, that tells anything: 0.01 of a sigma.
+constexpr double kLeastVariance = 1e-4;
 // Of all measurements, what a believable explanation passes.
 constexpr double kMinShare = 0.25;
 // A sample may explain this much less than is asked for: it has fewer observations to find the
@@ -35,40 +38,50 @@ int NumObservations(const std::vector<Track>& tracks) {
   return static_cast<int>(sum);
 }
 
-int Redundancy(const std::vector<BundleSummary>& bundles) {
-  int sum = 0;
+Explanation ExplanationBy(const std::vector<BundleSummary>& bundles) {
+  Explanation sum;
   for (const BundleSummary& bundle : bundles) {
-    sum += 2 * bundle.num_observations - 3 * bundle.num_points - 6 * bundle.num_frames;
+    sum.redundancy += 2 * bundle.num_observations - 3 * bundle.num_points - 6 * bundle.num_frames;
+    sum.cost += bundle.final_cost;
   }
   return sum;
 }
 
-int Redundancy(const TurningResult& turning) {
-  return 2 * turning.num_observations - 2 * turning.num_directions -
-         3 * static_cast<int>(turning.cam_from_world.size());
+Explanation ExplanationBy(const TurningResult& turning) {
+  const int num_free =
+      2 * turning.num_directions + 3 * static_cast<int>(turning.cam_from_world.size());
+  return {2 * turning.num_observations - num_free, turning.final_cost};
+}
+
+double Evidence(const Explanation& explanation, double limit) {
+  if (explanation.redundancy <= 0) return 0.0;
+  if (limit == 0.0) return explanation.redundancy;
+  const double variance = std::max(kLeastVariance, 2.0 * explanation.cost / explanation.redundancy);
+  return explanation.redundancy * std::max(0.0, 0.5 * std::log(limit * limit / variance));
 }
 
 std::optional<TurningResult> FindTurning(const Camera& camera,
                                          const RotationMap& cam_from_world,
                                          const std::vector<Track>& tracks,
-                                         int redundancy,
+                                         const Explanation& moving,
                                          const BundleOptions& options) {
-  const int num_given = NumObservations(tracks);
-  const double needed = std::max(static_cast<double>(redundancy), kMinShare * 2 * num_given);
+  const double limit = options.fine.max_error_px;
+  const double evidence_of_moving = Evidence(moving, limit);
+  // Whether a turn of `share` of all observations passes enough checks, and more than movement.
+  const auto is_believable = [&](const TurningResult& turning, double share) {
+    const Explanation explanation = ExplanationBy(turning);
+    return turning.Usable() && IsLensCredible(camera, turning.camera) &&
+           explanation.redundancy > share * kMinShare * 2 * NumObservations(tracks) &&
+           Evidence(explanation, limit) > share * evidence_of_moving;
+  };
   const std::vector<Track> sample = SampleOf(tracks);
   if (sample.size() < tracks.size()) {
+    const double share = static_cast<double>(NumObservations(sample)) / NumObservations(tracks);
     const TurningResult sampled = RefineTurning(camera, cam_from_world, sample, options);
-    const double share = static_cast<double>(NumObservations(sample)) / num_given;
-    if (!sampled.Usable() || !IsLensCredible(camera, sampled.camera) ||
-        Redundancy(sampled) < kSampleShare * share * needed) {
-      return std::nullopt;
-    }
+    if (!is_believable(sampled, kSampleShare * share)) return std::nullopt;
   }
   TurningResult turning = RefineTurning(camera, cam_from_world, tracks, options);
-  if (!turning.Usable() || !turning.lens_refined || !IsLensCredible(camera, turning.camera) ||
-      Redundancy(turning) <= needed) {
-    return std::nullopt;
-  }
+  if (!turning.lens_refined || !is_believable(turning, 1.0)) return std::nullopt;
   return turning;
 }
 

@@ -10,24 +10,37 @@ namespace rotslam {
 
 int NumObservations(const std::vector<Track>& tracks);
 
-/// Measurements that a model has passed as checks: two for each observation that it explains, less
-/// the numbers it was free to choose, three for a rotation or position and two (a direction) or
-/// three (a point) for each track.
-int Redundancy(const std::vector<BundleSummary>& bundles);
-int Redundancy(const TurningResult& turning);
+/// What speaks for a model of a sequence.
+struct Explanation {
+  // Measurements that it has passed as checks: two for each observation that it explains, less the
+  // numbers it was free to choose, three for a rotation or position and two (a direction) or three
+  // (a point) for each track.
+  int redundancy = 0;
+  double cost = 0.0;  // half the sum of robust squared residuals, in sigmas
+};
+
+Explanation ExplanationBy(const std::vector<BundleSummary>& bundles);
+Explanation ExplanationBy(const TurningResult& turning);
+
+/// In nats: each check tells how many times smaller residuals are than the limit (in sigmas) within
+/// which they count. Of models that pass as many checks the one with smaller residuals has more of
+/// it. 0 where nothing is checked; without a limit (0) all checks count alike.
+/// Source:  Moisan and Stival, A probabilistic criterion to detect rigid point matches, IJCV 2004,
+/// for weighing inliers against their precision.
+double Evidence(const Explanation& explanation, double limit);
 
 /// Rotations and a lens that explain a sequence better than a moving camera does. A calibration
 /// that is off by some percent makes wide turns in place look like movement, and no pair of frames
 /// can tell the two apart; all together can. Rotations alone are believed where another lens makes
-/// them fit and they pass more checks than positions and points do, and at least a quarter of all;
-/// a lens twice as long or more is not believed: a wall that a camera passes looks like a turn with
-/// a lens six times as long.
-/// @param redundancy  of positions and points; 0 where there are none.
+/// them fit and there is more evidence of them than of positions and points, and they pass at least
+/// a quarter of all checks; a lens twice as long or more is not believed: a wall that a camera
+/// passes looks like a turn with a lens six times as long.
+/// @param moving  positions and points; empty where there are none.
 /// Cost:  next to nothing where the camera does move: a sample of the tracks tells first.
 std::optional<TurningResult> FindTurning(const Camera& camera,
                                          const RotationMap& cam_from_world,
                                          const std::vector<Track>& tracks,
-                                         int redundancy,
+                                         const Explanation& moving,
                                          const BundleOptions& options);
 
 }  // namespace rotslam

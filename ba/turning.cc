@@ -7,6 +7,9 @@ namespace {
 
 // Standard deviation of the focal length given, as a share of it, where the lens may move.
 constexpr double kFocalSigma = 0.1;
+// Share of the cost that another lens must take off: with the focal length free there is always one
+// that fits somewhat better.
+constexpr double kMinLensGain = 0.01;
 
 }  // namespace
 
@@ -39,14 +42,17 @@ TurningResult RefineTurning(const Camera& camera,
     lens.refine_focal = true;
     lens.focal_sigma = std::max(lens.focal_sigma, kFocalSigma);
   }
+  lens.min_gain = std::max(lens.min_gain, kMinLensGain);
   const BundleResult refined = RefineBundle(problem, turning);
   result.status = refined.status;
   result.cam_from_world = refined.reconstruction.cam_from_world;
   result.camera = refined.camera;
   result.lens_refined = refined.summary.lens_refined;
   if (refined.summary.rounds.empty()) return result;
-  result.num_directions = refined.summary.rounds.back().num_directions;
-  result.num_observations = refined.summary.rounds.back().num_observations;
+  const BundleRoundSummary& last = refined.summary.rounds.back();
+  result.num_directions = last.num_directions;
+  result.num_observations = last.num_observations;
+  result.final_cost = last.final_cost;
   return result;
 }
 

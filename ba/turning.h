@@ -15,6 +15,7 @@ struct TurningResult {
   // Tracks, and observations of them, that one direction each explains.
   int num_directions = 0;
   int num_observations = 0;
+  double final_cost = 0.0;  // half the sum of robust squared residuals, in sigmas
 
   [[nodiscard]] bool Usable() const {
     return status == BundleStatus::kConverged || status == BundleStatus::kIterationLimit;
