@@ -12,6 +12,7 @@ int NumObservations(const std::vector<Track>& tracks);
 
 /// What speaks for a model of a sequence.
 struct Explanation {
+  int num_observations = 0;  // that it explains
   // Measurements that it has passed as checks: two for each observation that it explains, less the
   // numbers it was free to choose, three for a rotation or position and two (a direction) or three
   // (a point) for each track.
@@ -33,8 +34,10 @@ double Evidence(const Explanation& explanation, double limit);
 /// that is off by some percent makes wide turns in place look like movement, and no pair of frames
 /// can tell the two apart; all together can. Rotations alone are believed where another lens makes
 /// them fit and there is more evidence of them than of positions and points, and they pass at least
-/// a quarter of all checks; a lens twice as long or more is not believed: a wall that a camera
-/// passes looks like a turn with a lens six times as long.
+/// a quarter of all checks. Where positions and points leave a third of the observations out, small
+/// residuals of the rest only say that these were picked: then all checks count alike. A lens twice
+/// as long or more is not believed: a wall that a camera passes looks like a turn with a lens six
+/// times as long.
 /// @param moving  positions and points; empty where there are none.
 /// Cost:  next to nothing where the camera does move: a sample of the tracks tells first.
 std::optional<TurningResult> FindTurning(const Camera& camera,
