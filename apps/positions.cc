@@ -228,8 +228,8 @@ PositionResult MapKeyframes(const Orientations& orientations,
   const auto find_turning = [&]() -> std::optional<PositionResult> {
     if (!options.held_stretches.enabled) return std::nullopt;
     progress.StartStage("turning in place", -1);
-    const auto turning =
-        FindTurning(camera, keyframe_rotations, tracks, ExplanationBy(result.bundles), bundle_options);
+    const auto turning = FindTurning(
+        camera, keyframe_rotations, tracks, ExplanationBy(result.bundles), bundle_options);
     if (!turning) return std::nullopt;
     progress.EndStage("explains " + std::to_string(turning->num_observations) + " observations, " +
                       DescribeRounded(turning->camera));

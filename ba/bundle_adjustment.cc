@@ -16,6 +16,9 @@
 namespace rotslam {
 namespace {
 
+// Below, residuals are as good as none.
+constexpr double kLeastLossScale = 0.05;
+
 bool AllFinite(const BundleState& state) {
   return std::all_of(state.centers.begin(), state.centers.end(), [](const Eigen::Vector3d& center) {
     return center.allFinite();
@@ -72,6 +75,14 @@ std::vector<bool> UsedFlags(const BundleState& state) {
   return flags;
 }
 
+// The round with its loss as wide as the residuals are (`loss_medians`).
+BundleRound WithLossFor(const BundleState& state, BundleRound round) {
+  if (round.loss_medians == 0.0) return round;
+  const double scale = std::max(kLeastLossScale, round.loss_medians * MedianResidual(state));
+  round.loss_scale = std::min(round.loss_scale, scale);
+  return round;
+}
+
 // The rounds of one problem, one after the other.
 class Rounds {
  public:
@@ -82,11 +93,11 @@ class Rounds {
   void Run(const std::string& name, const BundleRound& round, BundleState& state) {
     if (!good_ || !round.enabled) return;
     const auto start = std::chrono::steady_clock::now();
-    last_ = &round;
     ClassifyAll(round, Placement::kAnywhere, options_, state);
     const ResidualStatistics before = Statistics(state);
     const bool is_first = result_.summary.rounds.empty();
-    Minimise(name, round, start, state);
+    last_ = WithLossFor(state, round);
+    Minimise(name, last_, start, state);
     if (good_ && is_first) result_.summary.before = before;
   }
 
@@ -94,14 +105,15 @@ class Rounds {
   void Repeat(const std::string& name, const BundleRound& round, BundleState& state) {
     // Few observations have changed: a step or two.
     constexpr double kEasier = 10.0;
-    BundleRound again = round;
-    again.function_tolerance *= kEasier;
     Run(name, round, state);
+    if (!round.enabled) return;
+    BundleRound again = last_;
+    again.function_tolerance *= kEasier;
     for (int k = 1; k < options_.max_fine_rounds; ++k) {
-      if (!good_ || !round.enabled) return;
+      if (!good_) return;
       const auto start = std::chrono::steady_clock::now();
       const std::vector<bool> before = UsedFlags(state);
-      ClassifyAll(round, Placement::kNearby, options_, state);
+      ClassifyAll(again, Placement::kNearby, options_, state);
       const std::vector<bool> after = UsedFlags(state);
       std::size_t changed = 0;
       for (std::size_t o = 0; o < after.size(); ++o) changed += before[o] != after[o] ? 1 : 0;
@@ -139,7 +151,8 @@ class Rounds {
   }
 
   bool good() const { return good_; }
-  const BundleRound& last() const { return *last_; }
+  // With the loss that it had.
+  const BundleRound& last() const { return last_; }
 
  private:
   LensSigmas SigmasOf(const Eigen::Matrix<double, 6, 6>& covariance) const {
@@ -198,7 +211,7 @@ class Rounds {
   BundleResult& result_;
   bool good_ = true;
   bool refine_lens_ = false;
-  const BundleRound* last_ = nullptr;
+  BundleRound last_;
 };
 
 // Poses and well-fitting tracks of `state`.
