@@ -16,9 +16,6 @@
 namespace rotslam {
 namespace {
 
-// Below, residuals are as good as none.
-constexpr double kLeastLossScale = 0.05;
-
 bool AllFinite(const BundleState& state) {
   return std::all_of(state.centers.begin(), state.centers.end(), [](const Eigen::Vector3d& center) {
     return center.allFinite();
@@ -75,14 +72,6 @@ std::vector<bool> UsedFlags(const BundleState& state) {
   return flags;
 }
 
-// The round with its loss as wide as the residuals are (`loss_medians`).
-BundleRound WithLossFor(const BundleState& state, BundleRound round) {
-  if (round.loss_medians == 0.0) return round;
-  const double scale = std::max(kLeastLossScale, round.loss_medians * MedianResidual(state));
-  round.loss_scale = std::min(round.loss_scale, scale);
-  return round;
-}
-
 // The rounds of one problem, one after the other.
 class Rounds {
  public:
@@ -93,11 +82,11 @@ class Rounds {
   void Run(const std::string& name, const BundleRound& round, BundleState& state) {
     if (!good_ || !round.enabled) return;
     const auto start = std::chrono::steady_clock::now();
+    last_ = &round;
     ClassifyAll(round, Placement::kAnywhere, options_, state);
     const ResidualStatistics before = Statistics(state);
     const bool is_first = result_.summary.rounds.empty();
-    last_ = WithLossFor(state, round);
-    Minimise(name, last_, start, state);
+    Minimise(name, round, start, state);
     if (good_ && is_first) result_.summary.before = before;
   }
 
@@ -105,15 +94,14 @@ class Rounds {
   void Repeat(const std::string& name, const BundleRound& round, BundleState& state) {
     // Few observations have changed: a step or two.
     constexpr double kEasier = 10.0;
-    Run(name, round, state);
-    if (!round.enabled) return;
-    BundleRound again = last_;
+    BundleRound again = round;
     again.function_tolerance *= kEasier;
+    Run(name, round, state);
     for (int k = 1; k < options_.max_fine_rounds; ++k) {
-      if (!good_) return;
+      if (!good_ || !round.enabled) return;
       const auto start = std::chrono::steady_clock::now();
       const std::vector<bool> before = UsedFlags(state);
-      ClassifyAll(again, Placement::kNearby, options_, state);
+      ClassifyAll(round, Placement::kNearby, options_, state);
       const std::vector<bool> after = UsedFlags(state);
       std::size_t changed = 0;
       for (std::size_t o = 0; o < after.size(); ++o) changed += before[o] != after[o] ? 1 : 0;
@@ -151,8 +139,7 @@ class Rounds {
   }
 
   bool good() const { return good_; }
-  // With the loss that it had.
-  const BundleRound& last() const { return last_; }
+  const BundleRound& last() const { return *last_; }
 
  private:
   LensSigmas SigmasOf(const Eigen::Matrix<double, 6, 6>& covariance) const {
@@ -211,7 +198,7 @@ class Rounds {
   BundleResult& result_;
   bool good_ = true;
   bool refine_lens_ = false;
-  BundleRound last_;
+  const BundleRound* last_ = nullptr;
 };
 
 // Poses and well-fitting tracks of `state`.

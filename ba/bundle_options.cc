@@ -9,7 +9,6 @@ std::optional<std::string> BundleRound::Problem() const {
     return OutOfRange("loss", loss, "huber, cauchy or none");
   }
   if (!(loss_scale > 0.0)) return OutOfRange("loss_scale", loss_scale, "positive");
-  if (!(loss_medians >= 0.0)) return OutOfRange("loss_medians", loss_medians, "at least 0");
   if (max_iterations < 1) return OutOfRange("max_iterations", max_iterations, "at least 1");
   if (!(function_tolerance >= 0.0)) {
     return OutOfRange("function_tolerance", function_tolerance, "at least 0");

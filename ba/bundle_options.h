@@ -19,10 +19,6 @@ struct BundleRound {
   std::string loss = "huber";
   // Residual, in sigmas, at which the loss leaves the quadratic.
   double loss_scale = 1.0;
-  // The same in medians of the residuals before the round, where that is less: keypoints are often
-  // better than their sigma says, and what is far out for them are tracks that drift. 2 instead of
-  // 0 halves errors on simulated walks. 0: loss_scale as it is.
-  double loss_medians = 0.0;
   // Levenberg-Marquardt steps.
   int max_iterations = 30;
   // Trust region at the start; a large one makes the first step a Gauss-Newton step.
@@ -40,7 +36,6 @@ struct BundleRound {
     visit("max_error_px", max_error_px);
     visit("loss", loss);
     visit("loss_scale", loss_scale);
-    visit("loss_medians", loss_medians);
     visit("max_iterations", max_iterations);
     visit("initial_radius", initial_radius);
     visit("function_tolerance", function_tolerance);
@@ -96,8 +91,7 @@ struct BundleOptions {
   // What is within 4 px of the bridge, rotations free.
   BundleRound coarse = {.max_error_px = 4.0};
   // What is within 2 px of that. Its `max_error_px` also decides what the result keeps.
-  BundleRound fine = {
-      .max_error_px = 2.0, .loss_medians = 2.0, .max_iterations = 50, .function_tolerance = 1e-5};
+  BundleRound fine = {.max_error_px = 2.0, .max_iterations = 50, .function_tolerance = 1e-5};
   // The rounds before the last one take tracks at random until every frame has so many
   // observations: enough to say where cameras are, at a third of the time. 0: all. The longest
   // tracks would do worse: they are those that the lens' errors and the tracker's drift bend most.

@@ -307,21 +307,6 @@ void ClassifyAll(const BundleRound& round,
   RemoveWeakFrames(classifier, options.min_frame_observations, state);
 }
 
-double MedianResidual(const BundleState& state) {
-  std::vector<double> residuals;
-  for (const TrackState& track : state.tracks) {
-    for (const Sight& sight : track.sights) {
-      if (!sight.used) continue;
-      residuals.push_back(ErrorPx(state, track, sight, track.position) /
-                          sight.observation->sigma_px);
-    }
-  }
-  if (residuals.empty()) return 0.0;
-  const auto middle = residuals.begin() + static_cast<std::ptrdiff_t>(residuals.size() / 2);
-  std::nth_element(residuals.begin(), middle, residuals.end());
-  return *middle;
-}
-
 ResidualStatistics Statistics(const BundleState& state) {
   std::vector<double> errors_px;
   for (const TrackState& track : state.tracks) {

@@ -20,9 +20,6 @@ void ClassifyAll(const BundleRound& round,
                  const BundleOptions& options,
                  BundleState& state);
 
-/// Of the used observations of points and directions, in sigmas; 0 where there are none.
-double MedianResidual(const BundleState& state);
-
 /// Reprojection errors of the used observations of points.
 ResidualStatistics Statistics(const BundleState& state);
 
