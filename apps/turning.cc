@@ -44,9 +44,16 @@ int NumObservations(const std::vector<Track>& tracks) {
 Explanation ExplanationBy(const std::vector<BundleSummary>& bundles) {
   Explanation sum;
   for (const BundleSummary& bundle : bundles) {
-    sum.num_observations += bundle.num_observations;
-    sum.redundancy += 2 * bundle.num_observations - 3 * bundle.num_points - 6 * bundle.num_frames;
-    sum.cost += bundle.final_cost;
+    // The last one at the widths that a turn has, too.
+    const auto round = std::find_if(
+        bundle.rounds.rbegin(), bundle.rounds.rend(), [](const BundleRoundSummary& candidate) {
+          return candidate.name != "close";
+        });
+    if (round == bundle.rounds.rend()) continue;
+    const int num_free = 3 * round->num_points + 2 * round->num_directions + 6 * round->num_frames;
+    sum.num_observations += round->num_observations;
+    sum.redundancy += 2 * round->num_observations - num_free;
+    sum.cost += round->final_cost;
   }
   return sum;
 }

@@ -16,6 +16,9 @@
 namespace rotslam {
 namespace {
 
+// Smallest spread of residuals, in sigmas, that anything is fitted to.
+constexpr double kLeastSpread = 0.01;
+
 bool AllFinite(const BundleState& state) {
   return std::all_of(state.centers.begin(), state.centers.end(), [](const Eigen::Vector3d& center) {
     return center.allFinite();
@@ -72,6 +75,19 @@ std::vector<bool> UsedFlags(const BundleState& state) {
   return flags;
 }
 
+// The round with its loss and its limit as wide as the residuals are (`loss_spreads`).
+BundleRound FittedToResiduals(BundleRound round,
+                              const BundleOptions& options,
+                              const BundleState& state) {
+  const double spread = std::max(kLeastSpread, ResidualSpread(state));
+  const auto narrow = [&](double spreads, double width) {
+    return spreads > 0.0 ? std::min(width, spreads * spread) : width;
+  };
+  round.loss_scale = narrow(options.loss_spreads, round.loss_scale);
+  round.max_error_px = narrow(options.limit_spreads, round.max_error_px);
+  return round;
+}
+
 // The rounds of one problem, one after the other.
 class Rounds {
  public:
@@ -82,7 +98,7 @@ class Rounds {
   void Run(const std::string& name, const BundleRound& round, BundleState& state) {
     if (!good_ || !round.enabled) return;
     const auto start = std::chrono::steady_clock::now();
-    last_ = &round;
+    last_ = round;
     ClassifyAll(round, Placement::kAnywhere, options_, state);
     const ResidualStatistics before = Statistics(state);
     const bool is_first = result_.summary.rounds.empty();
@@ -90,24 +106,28 @@ class Rounds {
     if (good_ && is_first) result_.summary.before = before;
   }
 
-  // The same, until classification changes next to nothing.
-  void Repeat(const std::string& name, const BundleRound& round, BundleState& state) {
+  // Goes on from `round` with its widths fitted to the residuals, until classification changes next
+  // to nothing.
+  void Close(const BundleRound& round, BundleState& state) {
     // Few observations have changed: a step or two.
     constexpr double kEasier = 10.0;
-    BundleRound again = round;
-    again.function_tolerance *= kEasier;
-    Run(name, round, state);
-    for (int k = 1; k < options_.max_fine_rounds; ++k) {
-      if (!good_ || !round.enabled) return;
+    if (!good_ || !round.enabled) return;
+    BundleRound close = FittedToResiduals(round, options_, state);
+    const bool is_narrower =
+        close.loss_scale < round.loss_scale || close.max_error_px < round.max_error_px;
+    for (int k = 1; k < options_.max_fine_rounds && good_; ++k) {
       const auto start = std::chrono::steady_clock::now();
       const std::vector<bool> before = UsedFlags(state);
-      ClassifyAll(round, Placement::kNearby, options_, state);
+      last_ = close;
+      ClassifyAll(close, Placement::kNearby, options_, state);
       const std::vector<bool> after = UsedFlags(state);
       std::size_t changed = 0;
       for (std::size_t o = 0; o < after.size(); ++o) changed += before[o] != after[o] ? 1 : 0;
       const auto total = static_cast<double>(std::count(after.begin(), after.end(), true));
-      if (static_cast<double>(changed) <= options_.max_changed_share * total) return;
-      Minimise(name, again, start, state);
+      const bool is_new = k == 1 && is_narrower;
+      if (!is_new && static_cast<double>(changed) <= options_.max_changed_share * total) return;
+      if (k == 2) close.function_tolerance *= kEasier;
+      Minimise("close", close, start, state);
     }
   }
 
@@ -139,7 +159,7 @@ class Rounds {
   }
 
   bool good() const { return good_; }
-  const BundleRound& last() const { return *last_; }
+  const BundleRound& last() const { return last_; }
 
  private:
   LensSigmas SigmasOf(const Eigen::Matrix<double, 6, 6>& covariance) const {
@@ -198,7 +218,7 @@ class Rounds {
   BundleResult& result_;
   bool good_ = true;
   bool refine_lens_ = false;
-  const BundleRound* last_ = nullptr;
+  BundleRound last_;
 };
 
 // Poses and well-fitting tracks of `state`.
@@ -270,7 +290,8 @@ BundleResult RefineBundle(const BundleProblem& problem, const BundleOptions& opt
   rounds.Run("coarse", options.coarse, preparing);
   rounds.TryLens(options.coarse, preparing);
   if (part) TakeCameras(*part, state);
-  rounds.Repeat("fine", options.fine, state);
+  rounds.Run("fine", options.fine, state);
+  rounds.Close(options.fine, state);
 
   BundleSummary& summary = result.summary;
   for (const BundleRoundSummary& round : summary.rounds) summary.iterations += round.iterations;

@@ -81,7 +81,7 @@ struct BundleRoundSummary {
 /// All rounds together. Costs are half the sum of robust squared residuals, in sigmas.
 struct BundleSummary {
   double initial_cost = 0.0;  // of the first round that takes all tracks
-  double final_cost = 0.0;    // of the last
+  double final_cost = 0.0;    // of the last, whose loss and limit may be narrower
   int iterations = 0;         // of all rounds
   ResidualStatistics before;  // observations of the first round, before its solve
   ResidualStatistics after;   // observations that are in the result

@@ -37,6 +37,8 @@ std::optional<std::string> BundleOptions::Problem() const {
   if (preparing_observations < 0) {
     return OutOfRange("preparing_observations", preparing_observations, "at least 0");
   }
+  if (!(loss_spreads >= 0.0)) return OutOfRange("loss_spreads", loss_spreads, "at least 0");
+  if (!(limit_spreads >= 0.0)) return OutOfRange("limit_spreads", limit_spreads, "at least 0");
   if (max_fine_rounds < 1) return OutOfRange("max_fine_rounds", max_fine_rounds, "at least 1");
   if (!(max_changed_share >= 0.0)) {
     return OutOfRange("max_changed_share", max_changed_share, "at least 0");

@@ -307,6 +307,26 @@ void ClassifyAll(const BundleRound& round,
   RemoveWeakFrames(classifier, options.min_frame_observations, state);
 }
 
+double ResidualSpread(const BundleState& state) {
+  std::vector<double> residuals;
+  std::size_t num_free = 0;
+  for (const TrackState& track : state.tracks) {
+    if (track.kind == TrackKind::kOut) continue;
+    num_free += track.kind == TrackKind::kPoint ? 3 : 2;
+    for (const Sight& sight : track.sights) {
+      if (!sight.used) continue;
+      residuals.push_back(ErrorPx(state, track, sight, track.position) /
+                          sight.observation->sigma_px);
+    }
+  }
+  if (residuals.empty()) return 0.0;
+  const auto middle = residuals.begin() + static_cast<std::ptrdiff_t>(residuals.size() / 2);
+  std::nth_element(residuals.begin(), middle, residuals.end());
+  // Two observations or more to a track: a quarter of the measurements or more.
+  const auto measured = static_cast<double>(2 * residuals.size());
+  return *middle * std::sqrt(measured / (measured - static_cast<double>(num_free)));
+}
+
 ResidualStatistics Statistics(const BundleState& state) {
   std::vector<double> errors_px;
   for (const TrackState& track : state.tracks) {

@@ -20,6 +20,11 @@ void ClassifyAll(const BundleRound& round,
                  const BundleOptions& options,
                  BundleState& state);
 
+/// How wide the residuals of the used observations are, in sigmas: their median, times what points
+/// take off residuals by fitting them, the root of two measurements to an observation over those
+/// less three (a point) or two (a direction) to a track. 0 where there are none.
+double ResidualSpread(const BundleState& state);
+
 /// Reprojection errors of the used observations of points.
 ResidualStatistics Statistics(const BundleState& state);
 

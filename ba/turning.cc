@@ -37,6 +37,9 @@ TurningResult RefineTurning(const Camera& camera,
   turning.bridge.refine_rotations = true;
   turning.bridge.loss = "cauchy";
   turning.find_covariance = false;
+  // Explanations are compared at the same loss and limit.
+  turning.loss_spreads = 0.0;
+  turning.limit_spreads = 0.0;
   LensOptions& lens = turning.lens;
   if (lens.refine_distortion || lens.refine_focal) {
     lens.refine_focal = true;

@@ -41,10 +41,12 @@ Json WorldFromCamera(const MapFrame& frame) {
 void WriteNerfTransforms(const std::filesystem::path& path,
                          const RunMap& map,
                          const std::filesystem::path& image_folder) {
-  const std::filesystem::path here = std::filesystem::absolute(path).parent_path();
-  const std::filesystem::path images = std::filesystem::absolute(image_folder)
-                                           .lexically_normal()
-                                           .lexically_proximate(here.lexically_normal());
+  std::filesystem::path images = image_folder;
+  if (!images.empty()) {
+    const std::filesystem::path here = std::filesystem::absolute(path).parent_path();
+    images = std::filesystem::absolute(images).lexically_normal().lexically_proximate(
+        here.lexically_normal());
+  }
   Json json = CameraToJson(map.camera);
   json["frames"] = Json::array();
   for (const MapFrame& frame : map.frames) {

@@ -10,7 +10,7 @@ namespace rotslam {
 /// OPENCV_FISHEYE; the principal point gains 0.5, like COLMAP's), and per frame its image, relative
 /// to the file's folder, and the pose camera->world in OpenGL's camera axes: x right, y up, z back.
 /// The world stays as it is. Numbers read back the same.
-/// @param image_folder  where the images are.
+/// @param image_folder  where the images are; empty where nobody knows: names alone are written.
 /// Throws std::runtime_error when the file cannot be written.
 void WriteNerfTransforms(const std::filesystem::path& path,
                          const RunMap& map,

@@ -83,8 +83,9 @@ Json PointToJson(const MapTrack& entry, const std::vector<int>& numbers) {
 void WriteOpenMvg(const std::filesystem::path& path,
                   const RunMap& map,
                   const std::filesystem::path& image_folder) {
-  Json json = {{"sfm_data_version", "0.3"},
-               {"root_path", std::filesystem::absolute(image_folder).lexically_normal().string()}};
+  std::filesystem::path root = image_folder;
+  if (!root.empty()) root = std::filesystem::absolute(root).lexically_normal();
+  Json json = {{"sfm_data_version", "0.3"}, {"root_path", root.string()}};
   for (const char* part : {"views", "intrinsics", "extrinsics", "structure", "control_points"}) {
     json[part] = Json::array();
   }

@@ -11,7 +11,7 @@ namespace rotslam {
 /// openMVG has one focal length, the mean of ours: where the two differ, its points project up to
 /// half their difference away at one focal length from the centre. Pixel centres are at integer
 /// coordinates, as here.
-/// @param image_folder  where the images are, openMVG's root path.
+/// @param image_folder  where the images are, openMVG's root path; may be empty.
 /// Throws std::runtime_error when the file cannot be written.
 void WriteOpenMvg(const std::filesystem::path& path,
                   const RunMap& map,

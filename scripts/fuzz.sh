@@ -22,6 +22,8 @@ cmake --build --preset fuzz || exit
 
 if [[ -d /dev/shm ]]; then export TMPDIR=${TMPDIR:-/dev/shm}; fi
 export PATH=$PATH:/usr/lib/llvm-14/bin  # where the sanitizers look for the symbolizer
+# See the asan test preset.
+export ASAN_OPTIONS=intercept_tls_get_addr=0
 export LSAN_OPTIONS=suppressions=$PWD/tests/lsan_suppressions.txt:print_suppressions=0
 
 # Each program lists its targets where none is chosen.

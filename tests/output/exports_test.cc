@@ -133,6 +133,17 @@ TEST(OpenMvg, ReadsBackTheSame) {
   EXPECT_EQ(json["structure"].size(), next);
 }
 
+// The folder is a text in the map's file, and a damaged one may have none.
+TEST(Exports, TakeAMapThatDoesNotKnowItsImageFolder) {
+  const TemporaryFolder folder;
+  const RunMap map = MapOfScene(ExportScene());
+  WriteNerfTransforms(folder.path() / "transforms.json", map, {});
+  EXPECT_EQ(ReadJson(folder.path() / "transforms.json")["frames"][0]["file_path"],
+            map.frames[0].image);
+  WriteOpenMvg(folder.path() / "sfm_data.json", map, {});
+  EXPECT_EQ(ReadJson(folder.path() / "sfm_data.json")["root_path"], "");
+}
+
 TEST(OpenMvg, PutsTheLensInItsOrder) {
   const TemporaryFolder folder;
   RunMap map = MapOfScene(ExportScene());
