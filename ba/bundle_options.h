@@ -90,8 +90,10 @@ struct BundleOptions {
   BundleRound bridge = {.refine_rotations = false, .max_error_px = 0.0, .function_tolerance = 1e-3};
   // What is within 4 px of the bridge, rotations free.
   BundleRound coarse = {.max_error_px = 4.0};
-  // What is within 2 px of that.
-  BundleRound fine = {.max_error_px = 2.0, .max_iterations = 50, .function_tolerance = 1e-5};
+  // What is within 2 px of that. Steps are Gauss-Newton's nearly from the start: damping holds back
+  // what little there is left to mend, the long waves in which a way bends.
+  BundleRound fine = {
+      .max_error_px = 2.0, .max_iterations = 50, .initial_radius = 1e8, .function_tolerance = 1e-5};
   // The rounds before the last one take tracks at random until every frame has so many
   // observations: enough to say where cameras are, at a third of the time. 0: all. The longest
   // tracks would do worse: they are those that the lens' errors and the tracker's drift bend most.
