@@ -44,16 +44,11 @@ int NumObservations(const std::vector<Track>& tracks) {
 Explanation ExplanationBy(const std::vector<BundleSummary>& bundles) {
   Explanation sum;
   for (const BundleSummary& bundle : bundles) {
-    // The last one at the widths that a turn has, too.
-    const auto round = std::find_if(
-        bundle.rounds.rbegin(), bundle.rounds.rend(), [](const BundleRoundSummary& candidate) {
-          return candidate.name != "close";
-        });
-    if (round == bundle.rounds.rend()) continue;
-    const int num_free = 3 * round->num_points + 2 * round->num_directions + 6 * round->num_frames;
-    sum.num_observations += round->num_observations;
-    sum.redundancy += 2 * round->num_observations - num_free;
-    sum.cost += round->final_cost;
+    const BundleSupport& support = bundle.support;
+    sum.num_observations += support.num_observations;
+    sum.redundancy +=
+        2 * support.num_observations - 3 * support.num_points - 6 * support.num_frames;
+    sum.cost += support.cost;
   }
   return sum;
 }

@@ -305,6 +305,7 @@ BundleResult RefineBundle(const BundleProblem& problem, const BundleOptions& opt
     summary.final_cost = summary.rounds.back().final_cost;
   }
   if (rounds.good()) {
+    summary.support = SupportWithin(options.fine, options, state);
     ClassifyAll(rounds.last(), Placement::kStays, options, state);
     summary.after = Statistics(state);
     rounds.FindCovariances(options.fine, state);

@@ -78,6 +78,15 @@ struct BundleRoundSummary {
   double solver_seconds = 0.0;
 };
 
+/// What points explain within the fine round's limit, however narrow the last round was: of two
+/// models of a sequence both are asked the same.
+struct BundleSupport {
+  int num_frames = 0;
+  int num_points = 0;
+  int num_observations = 0;
+  double cost = 0.0;  // half the sum of robust squared residuals, in sigmas
+};
+
 /// All rounds together. Costs are half the sum of robust squared residuals, in sigmas.
 struct BundleSummary {
   double initial_cost = 0.0;  // of the first round that takes all tracks
@@ -85,6 +94,7 @@ struct BundleSummary {
   int iterations = 0;         // of all rounds
   ResidualStatistics before;  // observations of the first round, before its solve
   ResidualStatistics after;   // observations that are in the result
+  BundleSupport support;
   int num_frames = 0;
   int num_points = 0;
   int num_observations = 0;

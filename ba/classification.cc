@@ -327,6 +327,31 @@ double ResidualSpread(const BundleState& state) {
   return *middle * std::sqrt(measured / (measured - static_cast<double>(num_free)));
 }
 
+BundleSupport SupportWithin(const BundleRound& round,
+                            const BundleOptions& options,
+                            BundleState state) {
+  ClassifyAll(round, Placement::kNearby, options, state);
+  const std::unique_ptr<ceres::LossFunction> loss = MakeLoss(round);
+  std::vector<bool> frame_sees(state.frames.size(), false);
+  BundleSupport support;
+  for (const TrackState& track : state.tracks) {
+    if (track.kind != TrackKind::kPoint) continue;
+    ++support.num_points;
+    for (const Sight& sight : track.sights) {
+      if (!sight.used) continue;
+      ++support.num_observations;
+      frame_sees[sight.frame] = true;
+      const double sigmas =
+          ErrorPx(state, track, sight, track.position) / sight.observation->sigma_px;
+      double rho[3] = {sigmas * sigmas, 1.0, 0.0};
+      if (loss) loss->Evaluate(sigmas * sigmas, rho);
+      support.cost += 0.5 * rho[0];
+    }
+  }
+  support.num_frames = static_cast<int>(std::count(frame_sees.begin(), frame_sees.end(), true));
+  return support;
+}
+
 ResidualStatistics Statistics(const BundleState& state) {
   std::vector<double> errors_px;
   for (const TrackState& track : state.tracks) {

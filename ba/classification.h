@@ -25,6 +25,11 @@ void ClassifyAll(const BundleRound& round,
 /// less three (a point) or two (a direction) to a track. 0 where there are none.
 double ResidualSpread(const BundleState& state);
 
+/// What the points explain within the round's limit, the cameras standing where they stand.
+BundleSupport SupportWithin(const BundleRound& round,
+                            const BundleOptions& options,
+                            BundleState state);
+
 /// Reprojection errors of the used observations of points.
 ResidualStatistics Statistics(const BundleState& state);
 

@@ -1,6 +1,7 @@
 // The whole chain on real sequences, where they are present.
 
 #include <filesystem>
+#include <fstream>
 #include <string>
 #include <vector>
 
@@ -97,6 +98,20 @@ TEST_F(SharedData, Pan720NeverLeavesItsPlace) {
   for (const StampedPose& pose : ReadTrajectory(Out() / "trajectory_tum.txt")) {
     EXPECT_EQ(pose.center_in_world, Eigen::Vector3d::Zero());
   }
+}
+
+// Three rings of stills from a tripod, 22 to 30 deg apart, with a lens that nobody calibrated.
+TEST_F(SharedData, Cmu0NeverLeavesItsPlace) {
+  ROTSLAM_SKIP_WITHOUT("cmu0");
+  const fs::path camera = Out().parent_path() / "camera.yaml";
+  std::ofstream(camera) << "{model: pinhole, width: 1300, height: 867, fx: 885, fy: 885, "
+                           "cx: 650, cy: 433.5}\n";
+  ASSERT_NO_FATAL_FAILURE(Do("run", "cmu0", {"--camera", camera.string()}));
+  const std::vector<SegmentRow> segments = ReadSegments(Out() / "segments.csv");
+  ASSERT_EQ(segments.size(), 1u);
+  EXPECT_EQ(segments[0].kind, "rotating");
+  EXPECT_EQ(segments[0].last, 37);
+  EXPECT_EQ(CountPlyPoints(Out() / "cloud.ply"), 0);
 }
 
 TEST_F(SharedData, Pan720) {
