@@ -1,10 +1,12 @@
 #include "ba/minimisation.h"
 
 #include <algorithm>
+#include <array>
 #include <deque>
 #include <memory>
 #include <vector>
 
+#include <ceres/evaluation_callback.h>
 #include <ceres/ordered_groups.h>
 #include <ceres/problem.h>
 #include <ceres/sphere_manifold.h>
@@ -12,7 +14,6 @@
 #include "ba/lens.h"
 #include "ba/loss.h"
 #include "ba/marginal_covariance.h"
-#include "ba/pose_manifold.h"
 #include "ba/reprojection_cost.h"
 
 namespace rotslam {
@@ -37,44 +38,85 @@ bool SharesCenters(const BundleState& state) {
   });
 }
 
-// The cameras' numbers, in one piece of memory: Ceres sorts the blocks of a group by address, and
-// with it the order of elimination, which must not depend on where an allocation lands. Poses are
-// one block each, for which Ceres has its specialised elimination of points; only
+// The cameras' numbers and the lens', in one piece of memory: Ceres sorts the blocks of a group by
+// address, and with it the order of elimination, which must not depend on where an allocation
+// lands. Poses are one block each, for which Ceres has its specialised elimination of points; only
 // frames that share a centre need those.
-class CameraBlocks {
+class CameraBlocks final : public ceres::EvaluationCallback {
  public:
-  explicit CameraBlocks(const BundleState& state)
-      : joint_(!SharesCenters(state)),
+  CameraBlocks(const BundleState& state, const Camera& calibrated, bool turns)
+      : layout_(!turns                 ? CameraLayout::kCenter
+                : SharesCenters(state) ? CameraLayout::kApart
+                                       : CameraLayout::kPose),
         num_centers_(state.centers.size()),
         frame_of_center_(state.centers.size(), 0),
-        numbers_(joint_ ? 7 * state.frames.size()
-                        : 3 * state.centers.size() + 4 * state.frames.size()) {
+        numbers_(3 * state.centers.size() + (turns ? 3 * state.frames.size() : 0) + kLensSize),
+        camera_(state.camera),
+        calibrated_(calibrated) {
+    LensParameters::Map(Lens()) = LensOf(state.camera, calibrated);
+    rotations_.reserve(state.frames.size());
     for (std::size_t k = 0; k < state.frames.size(); ++k) {
-      const Eigen::Vector4d q = state.frames[k].cam_from_world.Quaternion().coeffs();
-      std::copy_n(q.data(), 4, Quaternion(k));
+      rotations_.emplace_back(state.frames[k].cam_from_world);
       frame_of_center_[state.frames[k].center] = k;
-      std::copy_n(state.centers[state.frames[k].center].data(), 3, Center(state.frames[k].center));
+    }
+    for (std::size_t c = 0; c < num_centers_; ++c) {
+      std::copy_n(state.centers[c].data(), 3, Center(c));
     }
   }
 
-  bool joint() const { return joint_; }
-  // Of a frame: its pose where poses are joint.
-  double* Quaternion(std::size_t frame) {
-    return joint_ ? &numbers_[7 * frame] : &numbers_[3 * num_centers_ + 4 * frame];
+  // Before each evaluation: what many observations have in common.
+  void PrepareForEvaluation(bool /*evaluate_jacobians*/, bool new_evaluation_point) override {
+    if (!new_evaluation_point) return;
+    for (std::size_t k = 0; k < rotations_.size() && layout_ != CameraLayout::kCenter; ++k) {
+      rotations_[k].Turn(TurnOf(k));
+    }
+    if (moves_lens_) camera_ = WithLens(calibrated_, LensParameters::Map(Lens()));
+  }
+
+  CameraLayout layout() const { return layout_; }
+  // Of a frame; with kPose the whole pose, with kCenter null.
+  double* Turn(std::size_t frame) {
+    switch (layout_) {
+      case CameraLayout::kPose:
+        return &numbers_[6 * frame];
+      case CameraLayout::kApart:
+        return &numbers_[3 * (num_centers_ + frame)];
+      case CameraLayout::kCenter:
+        break;
+    }
+    return nullptr;
   }
   double* Center(std::size_t center) {
-    return joint_ ? Quaternion(frame_of_center_[center]) + 4 : &numbers_[3 * center];
+    if (layout_ == CameraLayout::kPose) return Turn(frame_of_center_[center]) + 3;
+    return &numbers_[3 * center];
   }
   // The parameter block that has a centre in it.
   double* BlockOfCenter(std::size_t center) {
-    return joint_ ? Quaternion(frame_of_center_[center]) : Center(center);
+    if (layout_ == CameraLayout::kPose) return Turn(frame_of_center_[center]);
+    return Center(center);
   }
+  double* Lens() { return &numbers_[numbers_.size() - kLensSize]; }
+  void FreeLens() { moves_lens_ = true; }
+
+  // As of the last evaluation.
+  const Camera& camera() const { return camera_; }
+  const TurnedRotation& RotationOf(std::size_t frame) const { return rotations_[frame]; }
+  // As the numbers say.
+  Rotation Turned(std::size_t frame) { return rotations_[frame].At(TurnOf(frame)); }
 
  private:
-  bool joint_;
+  static constexpr std::size_t kLensSize = LensParameters::SizeAtCompileTime;
+
+  Eigen::Vector3d TurnOf(std::size_t frame) { return Eigen::Vector3d::Map(Turn(frame)); }
+
+  CameraLayout layout_;
   std::size_t num_centers_;
   std::vector<std::size_t> frame_of_center_;
   std::vector<double> numbers_;
+  std::vector<TurnedRotation> rotations_;
+  Camera camera_;
+  const Camera& calibrated_;
+  bool moves_lens_ = false;
 };
 
 // The used observations as a Ceres problem over the state's own numbers.
@@ -90,9 +132,8 @@ class Minimisation {
         refine_lens_(refine_lens),
         state_(state),
         loss_(MakeLoss(round)),
-        problem_(ProblemOptions()),
-        lens_(LensOf(state.camera, calibrated)),
-        cameras_(state),
+        cameras_(state, calibrated, refine_rotations_),
+        problem_(ProblemOptions(cameras_)),
         frame_used_(state.frames.size(), false),
         center_used_(state.centers.size(), false) {
     ordering_ = std::make_shared<ceres::ParameterBlockOrdering>();
@@ -139,17 +180,17 @@ class Minimisation {
     }
     std::vector<double*> moving;
     for (std::size_t k = 0; k < state_.frames.size(); ++k) {
-      if (Moves(cameras_.Quaternion(k))) moving.push_back(cameras_.Quaternion(k));
+      if (Moves(cameras_.Turn(k))) moving.push_back(cameras_.Turn(k));
     }
-    for (std::size_t c = 0; c < state_.centers.size() && !cameras_.joint(); ++c) {
+    for (std::size_t c = 0; c < state_.centers.size() && !JointPoses(); ++c) {
       if (Moves(cameras_.Center(c))) moving.push_back(cameras_.Center(c));
     }
     std::vector<std::vector<double*>> groups;
     groups.reserve(state_.frames.size() + 1);
     for (std::size_t k = 0; k < state_.frames.size(); ++k) groups.push_back(MovingBlocks(k));
     if (refine_lens_) {
-      moving.push_back(lens_.data());
-      groups.push_back({lens_.data()});
+      moving.push_back(cameras_.Lens());
+      groups.push_back({cameras_.Lens()});
     }
     const auto found = MarginalCovariances(problem_, points, moving, groups);
     if (!found) return std::nullopt;
@@ -163,8 +204,9 @@ class Minimisation {
   }
 
  private:
-  static ceres::Problem::Options ProblemOptions() {
+  static ceres::Problem::Options ProblemOptions(CameraBlocks& cameras) {
     ceres::Problem::Options options;
+    options.evaluation_callback = &cameras;
     options.cost_function_ownership = ceres::DO_NOT_TAKE_OWNERSHIP;
     options.loss_function_ownership = ceres::DO_NOT_TAKE_OWNERSHIP;
     options.manifold_ownership = ceres::DO_NOT_TAKE_OWNERSHIP;
@@ -173,14 +215,17 @@ class Minimisation {
   }
 
   bool Moves(const double* block) const {
-    return problem_.HasParameterBlock(block) && !problem_.IsParameterBlockConstant(block);
+    return block != nullptr && problem_.HasParameterBlock(block) &&
+           !problem_.IsParameterBlockConstant(block);
   }
+
+  bool JointPoses() const { return cameras_.layout() == CameraLayout::kPose; }
 
   // The blocks that a frame's pose is made of, as far as they move.
   std::vector<double*> MovingBlocks(std::size_t frame) {
     std::vector<double*> blocks;
-    if (Moves(cameras_.Quaternion(frame))) blocks.push_back(cameras_.Quaternion(frame));
-    if (cameras_.joint()) return blocks;
+    if (Moves(cameras_.Turn(frame))) blocks.push_back(cameras_.Turn(frame));
+    if (JointPoses()) return blocks;
     double* const center = cameras_.Center(state_.frames[frame].center);
     if (Moves(center)) blocks.push_back(center);
     return blocks;
@@ -189,8 +234,7 @@ class Minimisation {
   // Zero for what is held. Only rotations alone leave the lower half zero.
   PoseCovariance OfPose(const Eigen::MatrixXd& moving, std::size_t frame) {
     PoseCovariance covariance = PoseCovariance::Zero();
-    const bool has_rotation = refine_rotations_ && Moves(cameras_.Quaternion(frame));
-    const Eigen::Index first = has_rotation ? 0 : 3;
+    const Eigen::Index first = Moves(cameras_.Turn(frame)) ? 0 : 3;
     covariance.block(first, first, moving.rows(), moving.cols()) = moving;
     return covariance;
   }
@@ -209,37 +253,34 @@ class Minimisation {
     for (std::size_t k = 0; k < state_.frames.size(); ++k) {
       if (!frame_used_[k]) continue;
       ++counts_.num_frames;
-      problem_.SetManifold(cameras_.Quaternion(k), ManifoldOfFrames());
-      ordering_->AddElementToGroup(cameras_.Quaternion(k), 1);
+      if (refine_rotations_) ordering_->AddElementToGroup(cameras_.Turn(k), 1);
     }
-    if (cameras_.joint()) return;
+    if (JointPoses()) return;
     for (std::size_t c = 0; c < state_.centers.size(); ++c) {
       if (center_used_[c]) ordering_->AddElementToGroup(cameras_.Center(c), 1);
     }
-  }
-
-  ceres::Manifold* ManifoldOfFrames() {
-    if (!cameras_.joint()) return &rotation_manifold_;
-    if (refine_rotations_) return &pose_manifold_;
-    return &center_manifold_;
   }
 
   void AddObservation(TrackState& track, const Sight& sight) {
     const FrameState& frame = state_.frames[sight.frame];
     const Observation& observation = *sight.observation;
     ObservationForm form;
-    form.joint_pose = cameras_.joint();
+    form.camera = cameras_.layout();
     form.at_infinity = track.kind == TrackKind::kDirection;
     form.moves_lens = refine_lens_;
-    costs_.emplace_back(refine_lens_ ? calibrated_ : state_.camera,
+    costs_.emplace_back(cameras_.camera(),
+                        calibrated_,
+                        cameras_.RotationOf(sight.frame),
                         observation.keypoint_px,
                         observation.sigma_px,
                         form);
-    std::vector<double*> blocks = {cameras_.Quaternion(sight.frame)};
-    if (!form.joint_pose && !form.at_infinity) blocks.push_back(cameras_.Center(frame.center));
-    blocks.push_back(track.position.data());
-    if (form.moves_lens) blocks.push_back(lens_.data());
-    problem_.AddResidualBlock(&costs_.back(), loss_.get(), blocks);
+    std::array<double*, 4> blocks;
+    int num_blocks = 0;
+    if (refine_rotations_) blocks[num_blocks++] = cameras_.Turn(sight.frame);
+    if (!JointPoses() && !form.at_infinity) blocks[num_blocks++] = cameras_.Center(frame.center);
+    blocks[num_blocks++] = track.position.data();
+    if (form.moves_lens) blocks[num_blocks++] = cameras_.Lens();
+    problem_.AddResidualBlock(&costs_.back(), loss_.get(), blocks.data(), num_blocks);
     frame_used_[sight.frame] = true;
     if (!form.at_infinity) center_used_[frame.center] = true;
     if (!frame.fixed) moving_ = true;
@@ -255,18 +296,20 @@ class Minimisation {
     LensParameters sigmas;
     sigmas << focal, kHeldSigma, center, center, bend, bend;
     lens_prior_ = std::make_unique<LensPriorCost>(LensOf(calibrated_, calibrated_), sigmas);
-    problem_.AddResidualBlock(lens_prior_.get(), nullptr, lens_.data());
-    ordering_->AddElementToGroup(lens_.data(), 1);
+    problem_.AddResidualBlock(lens_prior_.get(), nullptr, cameras_.Lens());
+    ordering_->AddElementToGroup(cameras_.Lens(), 1);
+    cameras_.FreeLens();
   }
 
   void TakeLens(const LensOptions& options) {
-    if (!refine_lens_ || !lens_.allFinite()) return;
+    LensParameters lens = LensParameters::Map(cameras_.Lens());
+    if (!refine_lens_ || !lens.allFinite()) return;
     const LensParameters given = LensOf(calibrated_, calibrated_);
-    lens_[1] = given[1];
-    if (!options.refine_focal) lens_[0] = given[0];
-    if (!options.refine_principal_point) lens_.segment<2>(2) = given.segment<2>(2);
-    if (!options.refine_distortion) lens_.tail<2>() = given.tail<2>();
-    SetCamera(WithLens(calibrated_, lens_), state_);
+    lens[1] = given[1];
+    if (!options.refine_focal) lens[0] = given[0];
+    if (!options.refine_principal_point) lens.segment<2>(2) = given.segment<2>(2);
+    if (!options.refine_distortion) lens.tail<2>() = given.tail<2>();
+    SetCamera(WithLens(calibrated_, lens), state_);
   }
 
   // Holds fixed frames, or else the first one, and the scale where no two held centres hold it
@@ -276,8 +319,7 @@ class Minimisation {
     for (std::size_t k = 0; k < state_.frames.size(); ++k) {
       const FrameState& frame = state_.frames[k];
       if (frame.fixed) held[frame.center] = true;
-      const bool still = frame.fixed || (!cameras_.joint() && !refine_rotations_);
-      if (frame_used_[k] && still) problem_.SetParameterBlockConstant(cameras_.Quaternion(k));
+      if (frame_used_[k] && frame.fixed) HoldTurn(k);
     }
     for (std::size_t c = 0; c < held.size(); ++c) held[c] = held[c] && center_used_[c];
     int origin = -1;
@@ -290,6 +332,11 @@ class Minimisation {
     }
     if (origin < 0) origin = HoldFirstFrame();
     if (origin >= 0 && num_held < 2) AnchorScale(origin);
+  }
+
+  // A held pose is held whole.
+  void HoldTurn(std::size_t frame) {
+    if (refine_rotations_) problem_.SetParameterBlockConstant(cameras_.Turn(frame));
   }
 
   // The first frame that sees points. Where there are directions alone there is no centre to hold:
@@ -305,7 +352,7 @@ class Minimisation {
     }
     for (std::size_t k = 0; k < state_.frames.size(); ++k) {
       if (!frame_used_[k] || !used(k)) continue;
-      problem_.SetParameterBlockConstant(cameras_.Quaternion(k));
+      HoldTurn(k);
       if (!has_points) return -1;
       problem_.SetParameterBlockConstant(cameras_.BlockOfCenter(state_.frames[k].center));
       return state_.frames[k].center;
@@ -324,7 +371,7 @@ class Minimisation {
     }
     if (farthest < 0) return;
     anchor_ = std::make_unique<ScaleAnchorCost>(
-        state_.centers[origin], state_.centers[farthest], kScaleAnchorWeight, cameras_.joint());
+        state_.centers[origin], state_.centers[farthest], kScaleAnchorWeight, cameras_.layout());
     problem_.AddResidualBlock(anchor_.get(), nullptr, cameras_.BlockOfCenter(farthest));
   }
 
@@ -334,11 +381,9 @@ class Minimisation {
       std::copy_n(cameras_.Center(c), 3, state_.centers[c].data());
     }
     for (std::size_t k = 0; k < state_.frames.size(); ++k) {
-      double* const quaternion = cameras_.Quaternion(k);
-      if (!frame_used_[k] || !refine_rotations_) continue;
-      if (problem_.IsParameterBlockConstant(quaternion)) continue;
-      const Eigen::Quaterniond q(quaternion);
-      if (q.coeffs().allFinite()) state_.frames[k].cam_from_world = Rotation(q);
+      if (!frame_used_[k] || !Moves(cameras_.Turn(k))) continue;
+      if (!Eigen::Vector3d::Map(cameras_.Turn(k)).allFinite()) continue;
+      state_.frames[k].cam_from_world = cameras_.Turned(k);
     }
   }
 
@@ -347,16 +392,12 @@ class Minimisation {
   const bool refine_lens_;
   BundleState& state_;
   std::unique_ptr<ceres::LossFunction> loss_;
-  LeftRotationManifold rotation_manifold_;
-  PoseManifold pose_manifold_;
-  CenterManifold center_manifold_;
   ceres::SphereManifold<3> directions_;
   std::deque<ReprojectionCost> costs_;
   std::unique_ptr<LensPriorCost> lens_prior_;
   std::unique_ptr<ScaleAnchorCost> anchor_;
-  ceres::Problem problem_;
-  LensParameters lens_;
   CameraBlocks cameras_;
+  ceres::Problem problem_;
   std::vector<bool> frame_used_;
   std::vector<bool> center_used_;
   std::shared_ptr<ceres::ParameterBlockOrdering> ordering_;

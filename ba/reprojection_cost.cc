@@ -1,16 +1,14 @@
 #include "ba/reprojection_cost.h"
 
 #include <algorithm>
+#include <cmath>
 
 #include <Eigen/Geometry>
-
-#include "ba/quaternion_jacobian.h"
-#include "rotodom/types/rotation.h"
 
 namespace rotslam {
 namespace {
 
-constexpr int kPoseSize = 7;
+constexpr int kPoseSize = 6;
 constexpr double kOrigin[3] = {0.0, 0.0, 0.0};
 
 template <int Cols>
@@ -24,44 +22,45 @@ Eigen::Map<RowMatrix<Cols>, 0, Eigen::OuterStride<>> Columns(double* data, int s
 
 // Where an observation's numbers lie, and where its derivatives go; null where it has none.
 struct Blocks {
-  const double* quaternion;
   const double* center = kOrigin;
   const double* point;
-  const double* lens = nullptr;
-  double* J_quaternion = nullptr;
+  double* J_turn = nullptr;
   double* J_center = nullptr;
   double* J_point = nullptr;
   double* J_lens = nullptr;
-  int quaternion_stride = 4;
-  int center_stride = 3;
+  int camera_stride = 3;
 
   bool WantJacobians() const {
-    return J_quaternion != nullptr || J_center != nullptr || J_point != nullptr ||
-           J_lens != nullptr;
+    return J_turn != nullptr || J_center != nullptr || J_point != nullptr || J_lens != nullptr;
   }
 };
 
 Blocks BlocksOf(const ObservationForm& form, double const* const* parameters, double** jacobians) {
-  const auto jacobian = [&](int block) {
-    return jacobians == nullptr ? nullptr : jacobians[block];
-  };
   int next = 0;
+  const auto jacobian = [&] { return jacobians == nullptr ? nullptr : jacobians[next]; };
   Blocks blocks;
-  blocks.quaternion = parameters[next];
-  blocks.J_quaternion = jacobian(next);
-  if (form.joint_pose) {
-    blocks.quaternion_stride = blocks.center_stride = kPoseSize;
-    if (blocks.J_quaternion != nullptr) blocks.J_center = blocks.J_quaternion + 4;
-    if (!form.at_infinity) blocks.center = blocks.quaternion + 4;
-  } else if (!form.at_infinity) {
-    blocks.center = parameters[++next];
-    blocks.J_center = jacobian(next);
+  if (form.camera == CameraLayout::kPose) {
+    blocks.camera_stride = kPoseSize;
+    blocks.J_turn = jacobian();
+    if (blocks.J_turn != nullptr) blocks.J_center = blocks.J_turn + 3;
+    if (!form.at_infinity) blocks.center = parameters[next] + 3;
+    ++next;
+  } else {
+    if (form.camera == CameraLayout::kApart) {
+      blocks.J_turn = jacobian();
+      ++next;
+    }
+    if (!form.at_infinity) {
+      blocks.J_center = jacobian();
+      blocks.center = parameters[next];
+      ++next;
+    }
   }
-  blocks.point = parameters[++next];
-  blocks.J_point = jacobian(next);
+  blocks.J_point = jacobian();
+  blocks.point = parameters[next];
   if (form.moves_lens) {
-    blocks.lens = parameters[++next];
-    blocks.J_lens = jacobian(next);
+    ++next;
+    blocks.J_lens = jacobian();
   }
   return blocks;
 }
@@ -85,15 +84,47 @@ std::optional<Eigen::Vector2d> Reproject(const Camera& camera,
   return pixel;
 }
 
+Eigen::Matrix3d LeftJacobian(const Eigen::Vector3d& rotation_vector) {
+  constexpr double kSmall = 1e-4;
+  const double angle = rotation_vector.norm();
+  const double square = angle * angle;
+  double first = 0.5 - square / 24.0;
+  double second = 1.0 / 6.0 - square / 120.0;
+  if (angle > kSmall) {
+    const double half = std::sin(0.5 * angle);
+    first = 2.0 * half * half / square;
+    second = (angle - std::sin(angle)) / (square * angle);
+  }
+  const Eigen::Matrix3d W = Skew(rotation_vector);
+  return Eigen::Matrix3d::Identity() + first * W + second * W * W;
+}
+
+void TurnedRotation::Turn(const Eigen::Vector3d& turn) {
+  R_c_w_ = At(turn).Matrix();
+  J_turn_ = LeftJacobian(turn);
+}
+
 ReprojectionCost::ReprojectionCost(const Camera& camera,
+                                   const Camera& calibrated,
+                                   const TurnedRotation& rotation,
                                    const Eigen::Vector2d& keypoint_px,
                                    double sigma_px,
                                    const ObservationForm& form)
-    : camera_(camera), keypoint_px_(keypoint_px), sigma_px_(sigma_px), form_(form) {
+    : camera_(camera),
+      calibrated_(calibrated),
+      rotation_(rotation),
+      keypoint_px_(keypoint_px),
+      sigma_px_(sigma_px),
+      form_(form) {
   set_num_residuals(2);
   std::vector<std::int32_t>& sizes = *mutable_parameter_block_sizes();
-  sizes.push_back(form.joint_pose ? kPoseSize : 4);
-  if (!form.joint_pose && !form.at_infinity) sizes.push_back(3);
+  sizes.reserve(4);
+  if (form.camera == CameraLayout::kPose) {
+    sizes.push_back(kPoseSize);
+  } else {
+    if (form.camera == CameraLayout::kApart) sizes.push_back(3);
+    if (!form.at_infinity) sizes.push_back(3);
+  }
   sizes.push_back(3);
   if (form.moves_lens) sizes.push_back(6);
 }
@@ -102,18 +133,12 @@ bool ReprojectionCost::Evaluate(double const* const* parameters,
                                 double* residuals,
                                 double** jacobians) const {
   const Blocks blocks = BlocksOf(form_, parameters, jacobians);
-  const Camera bent = form_.moves_lens
-                          ? WithLens(camera_, Eigen::Map<const LensParameters>(blocks.lens))
-                          : Camera();
-  const Camera& camera = form_.moves_lens ? bent : camera_;
-  const Eigen::Quaterniond q(blocks.quaternion);
-  const Eigen::Matrix3d R_c_w = q.normalized().toRotationMatrix();
   const Eigen::Map<const Eigen::Vector3d> center(blocks.center);
   const Eigen::Map<const Eigen::Vector3d> point(blocks.point);
   const double weight = 1.0 / sigma_px_;
   ReprojectionJacobian J;
   const std::optional<Eigen::Vector2d> pixel =
-      Reproject(camera, R_c_w, center, point, blocks.WantJacobians() ? &J : nullptr);
+      Reproject(camera_, rotation_.R_c_w(), center, point, blocks.WantJacobians() ? &J : nullptr);
   if (!pixel) {
     J.by_rotation.setZero();
     J.by_center.setZero();
@@ -122,19 +147,20 @@ bool ReprojectionCost::Evaluate(double const* const* parameters,
   Eigen::Map<Eigen::Vector2d> residual(residuals);
   residual = pixel ? Eigen::Vector2d(weight * (*pixel - keypoint_px_))
                    : Eigen::Vector2d::Constant(weight * kUnseenResidual_px);
-  if (blocks.J_quaternion != nullptr) {
-    Columns<4>(blocks.J_quaternion, blocks.quaternion_stride).noalias() =
-        weight * J.by_rotation * LeftInverseJacobian(q);
+  if (blocks.J_turn != nullptr) {
+    Columns<3>(blocks.J_turn, blocks.camera_stride).noalias() =
+        weight * J.by_rotation * rotation_.J_turn();
   }
   if (blocks.J_center != nullptr) {
     if (form_.at_infinity) J.by_center.setZero();
-    Columns<3>(blocks.J_center, blocks.center_stride) = weight * J.by_center;
+    Columns<3>(blocks.J_center, blocks.camera_stride) = weight * J.by_center;
   }
   if (blocks.J_point != nullptr) Columns<3>(blocks.J_point, 3) = weight * J.by_point;
   if (blocks.J_lens != nullptr) {
     auto J_lens = Columns<6>(blocks.J_lens, 6);
     if (pixel) {
-      J_lens = weight * LensJacobian(camera, camera_, R_c_w * (point - center), *pixel);
+      J_lens =
+          weight * LensJacobian(camera_, calibrated_, rotation_.R_c_w() * (point - center), *pixel);
     } else {
       J_lens.setZero();
     }
@@ -145,13 +171,13 @@ bool ReprojectionCost::Evaluate(double const* const* parameters,
 ScaleAnchorCost::ScaleAnchorCost(const Eigen::Vector3d& origin,
                                  const Eigen::Vector3d& start_center,
                                  double weight,
-                                 bool joint_pose)
+                                 CameraLayout layout)
     : origin_(origin),
       scaled_direction_((start_center - origin) / (start_center - origin).squaredNorm()),
       weight_(weight),
-      offset_(joint_pose ? 4 : 0) {
+      offset_(layout == CameraLayout::kPose ? 3 : 0) {
   set_num_residuals(1);
-  mutable_parameter_block_sizes()->push_back(joint_pose ? kPoseSize : 3);
+  mutable_parameter_block_sizes()->push_back(offset_ + 3);
 }
 
 bool ScaleAnchorCost::Evaluate(double const* const* parameters,

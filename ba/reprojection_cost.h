@@ -8,6 +8,7 @@
 
 #include "ba/lens.h"
 #include "rotodom/camera/camera.h"
+#include "rotodom/types/rotation.h"
 
 namespace rotslam {
 
@@ -33,24 +34,62 @@ std::optional<Eigen::Vector2d> Reproject(const Camera& camera,
 /// something but is not refused for their sake, and they fall at the next classification.
 inline constexpr double kUnseenResidual_px = 1e3;
 
-/// Which parameter blocks an observation has, in this order.
+/// A frame's orientation while a minimisation moves it: Exp(turn) * start, in exponential
+/// coordinates about where it starts. What all observations of the frame have in common is worked
+/// out once for all of them.
+class TurnedRotation {
+ public:
+  explicit TurnedRotation(const Rotation& start) : start_(start) { Turn(Eigen::Vector3d::Zero()); }
+
+  /// @param turn  radians, in the camera's frame; shorter than a full turn.
+  void Turn(const Eigen::Vector3d& turn);
+  /// Exp(turn) * start.
+  Rotation At(const Eigen::Vector3d& turn) const { return Rotation::Exp(turn) * start_; }
+
+  // As of the last turn.
+  const Eigen::Matrix3d& R_c_w() const { return R_c_w_; }
+  // d(delta) / d(turn), where Exp(delta) * R_c_w is where a small change of the turn leads.
+  const Eigen::Matrix3d& J_turn() const { return J_turn_; }
+
+ private:
+  Rotation start_;
+  Eigen::Matrix3d R_c_w_;
+  Eigen::Matrix3d J_turn_;
+};
+
+/// d(delta) / d(rotation_vector), Exp(rotation_vector + change) = Exp(delta) *
+/// Exp(rotation_vector). Error: equals central differences to 1e-9 (ba tests).
+Eigen::Matrix3d LeftJacobian(const Eigen::Vector3d& rotation_vector);
+
+/// Which parameter blocks a camera has.
+enum class CameraLayout {
+  kPose,    // turn and centre, one block of six: Ceres' specialised elimination
+  kApart,   // turn (3), then centre (3), which frames can share
+  kCenter,  // centre (3); the rotation is held
+};
+
+/// Which parameter blocks an observation has: those of the camera, the point (3), the lens.
 struct ObservationForm {
-  // The pose as one block of seven (PoseManifold), or quaternion (4) and centre (3) apart, so that
-  // frames can share a centre.
-  bool joint_pose = true;
-  // The point (3) lies in a direction of any length, without depth: the centre does not count, and
-  // has no block where poses come apart. Such tracks are seen from one place only, but tell how the
-  // camera turned.
+  CameraLayout camera = CameraLayout::kPose;
+  // The point lies in a direction of any length, without depth: the centre does not count, and has
+  // no block where it comes apart. Such tracks are seen from one place only, but tell how the
+  // camera turned. Not with kCenter, where they have nothing to say.
   bool at_infinity = false;
   // LensParameters (6) come last.
   bool moves_lens = false;
 };
 
-/// (Project(R_c_w (point - center)) - keypoint_px) / sigma_px. Quaternions are used as q / |q|.
+/// (Project(R_c_w (point - center)) - keypoint_px) / sigma_px.
 class ReprojectionCost final : public ceres::CostFunction {
  public:
-  /// @param camera  must outlive the cost function; where the lens moves, the calibrated one.
+  /// @param camera      with the lens that the parameters say,
+  /// @param rotation    turned as the parameters say: the caller keeps both so (see
+  ///                    ceres::EvaluationCallback).
+  /// @param calibrated  what LensParameters refer to.
+  /// All three must outlive the cost function.
   ReprojectionCost(const Camera& camera,
+                   const Camera& calibrated,
+                   const TurnedRotation& rotation,
                    const Eigen::Vector2d& keypoint_px,
                    double sigma_px,
                    const ObservationForm& form = {});
@@ -60,6 +99,8 @@ class ReprojectionCost final : public ceres::CostFunction {
 
  private:
   const Camera& camera_;
+  const Camera& calibrated_;
+  const TurnedRotation& rotation_;
   Eigen::Vector2d keypoint_px_;
   double sigma_px_;
   ObservationForm form_;
@@ -71,11 +112,11 @@ class ReprojectionCost final : public ceres::CostFunction {
 /// size, which is what Ceres' specialised Schur elimination asks for.
 class ScaleAnchorCost final : public ceres::CostFunction {
  public:
-  /// @param joint_pose  the block is a pose of seven, not a centre.
+  /// @param layout  of the camera whose block has the centre in it.
   ScaleAnchorCost(const Eigen::Vector3d& origin,
                   const Eigen::Vector3d& start_center,
                   double weight,
-                  bool joint_pose);
+                  CameraLayout layout);
   bool Evaluate(double const* const* parameters,
                 double* residuals,
                 double** jacobians) const override;

@@ -7,7 +7,6 @@
 #include <ceres/loss_function.h>
 #include <gtest/gtest.h>
 
-#include "ba/pose_manifold.h"
 #include "ba/reprojection_cost.h"
 #include "tests/ba/ba_scene.h"
 
@@ -21,11 +20,11 @@ class StreetProblem {
       : scene_(MakeBaScene({.num_frames = 8, .num_points = 60, .noise_px = 0.5})),
         problem_(Options()) {
     poses_.reserve(scene_.truth.cam_from_world.size());
+    rotations_.reserve(scene_.truth.cam_from_world.size());
     for (const auto& [frame, rotation] : scene_.truth.cam_from_world) {
-      Eigen::Matrix<double, 7, 1> pose;
-      pose << rotation.Quaternion().coeffs(), scene_.truth.center_in_world.at(frame);
-      poses_.push_back(pose);
-      problem_.AddParameterBlock(poses_.back().data(), 7, &manifold_);
+      rotations_.emplace_back(rotation);
+      poses_.emplace_back() << Eigen::Vector3d::Zero(), scene_.truth.center_in_world.at(frame);
+      problem_.AddParameterBlock(poses_.back().data(), 6);
       (frame.value < num_held ? held_ : cameras_).push_back(poses_.back().data());
     }
     for (double* pose : held_) problem_.SetParameterBlockConstant(pose);
@@ -33,7 +32,11 @@ class StreetProblem {
       double* const point = scene_.truth.point_in_world.at(track.id).data();
       points_.push_back(point);
       for (const Observation& observation : track.observations) {
-        costs_.emplace_back(scene_.camera, observation.keypoint_px, observation.sigma_px);
+        costs_.emplace_back(scene_.camera,
+                            scene_.camera,
+                            rotations_[observation.frame.value],
+                            observation.keypoint_px,
+                            observation.sigma_px);
         problem_.AddResidualBlock(
             &costs_.back(), &loss_, poses_[observation.frame.value].data(), point);
       }
@@ -49,15 +52,14 @@ class StreetProblem {
     ceres::Problem::Options options;
     options.cost_function_ownership = ceres::DO_NOT_TAKE_OWNERSHIP;
     options.loss_function_ownership = ceres::DO_NOT_TAKE_OWNERSHIP;
-    options.manifold_ownership = ceres::DO_NOT_TAKE_OWNERSHIP;
     return options;
   }
 
   BaScene scene_;
-  PoseManifold manifold_;
   ceres::HuberLoss loss_{1.0};
   std::deque<ReprojectionCost> costs_;
-  std::vector<Eigen::Matrix<double, 7, 1>> poses_;
+  std::vector<TurnedRotation> rotations_;
+  std::vector<Eigen::Matrix<double, 6, 1>> poses_;
   std::vector<double*> held_, cameras_, points_;
   ceres::Problem problem_;
 };

@@ -1,11 +1,10 @@
 #include "ba/reprojection_cost.h"
 
 #include <ceres/autodiff_cost_function.h>
-#include <ceres/manifold_test_utils.h>
+#include <ceres/rotation.h>
 #include <gtest/gtest.h>
 
 #include "ba/lens.h"
-#include "ba/pose_manifold.h"
 #include "rotodom/types/rotation.h"
 #include "tests/ba/ba_scene.h"
 
@@ -80,25 +79,70 @@ void ExpectJacobiansAgree(const ceres::CostFunction& cost, std::vector<std::vect
   }
 }
 
+const Rotation kStart = Rotation::Exp({0.3, -0.2, 0.1});
+const Eigen::Vector2d kKeypoint_px(600.0, 200.0);
+constexpr double kSigma_px = 0.7;
+
+// A reprojection cost that keeps rotation and lens as its parameters say.
+class FollowingCost final : public ceres::CostFunction {
+ public:
+  FollowingCost(const Camera& calibrated, const ObservationForm& form)
+      : calibrated_(calibrated),
+        camera_(calibrated),
+        rotation_(kStart),
+        form_(form),
+        cost_(camera_, calibrated_, rotation_, kKeypoint_px, kSigma_px, form) {
+    set_num_residuals(cost_.num_residuals());
+    *mutable_parameter_block_sizes() = cost_.parameter_block_sizes();
+  }
+
+  bool Evaluate(double const* const* parameters,
+                double* residuals,
+                double** jacobians) const override {
+    if (form_.camera != CameraLayout::kCenter) {
+      rotation_.Turn(Eigen::Vector3d::Map(parameters[0]));
+    }
+    if (form_.moves_lens) {
+      const double* const lens = parameters[parameter_block_sizes().size() - 1];
+      camera_ = WithLens(calibrated_, LensParameters::Map(lens));
+    }
+    return cost_.Evaluate(parameters, residuals, jacobians);
+  }
+
+ private:
+  Camera calibrated_;
+  mutable Camera camera_;
+  mutable TurnedRotation rotation_;
+  ObservationForm form_;
+  ReprojectionCost cost_;
+};
+
 TEST_P(ReprojectionForEveryCamera, JacobiansOfCostsEqualCentralDifferences) {
   const Camera camera = BaCamera(GetParam());
-  const Eigen::Vector4d q = Rotation::Exp({0.3, -0.2, 0.1}).Quaternion().coeffs();
-  const std::vector<double> quaternion(q.data(), q.data() + 4);
-  std::vector<double> pose = quaternion;
-  pose.insert(pose.end(), {0.4, -0.3, 0.2});
+  const std::vector<double> turn = {0.02, -0.15, 0.1};
   const std::vector<double> center = {0.4, -0.3, 0.2};
+  std::vector<double> pose = turn;
+  pose.insert(pose.end(), center.begin(), center.end());
   const std::vector<double> point = {1.1, -0.7, 4.0};
   const std::vector<double> lens = {1.02, 0.99, 0.01, -0.02, -0.05, 0.03};
+  using Blocks = std::vector<std::vector<double>>;
+  const struct {
+    CameraLayout layout;
+    bool at_infinity;
+    Blocks camera_blocks;
+  } cases[] = {
+      {CameraLayout::kPose, false, {pose}},
+      {CameraLayout::kPose, true, {pose}},
+      {CameraLayout::kApart, false, {turn, center}},
+      {CameraLayout::kApart, true, {turn}},
+      {CameraLayout::kCenter, false, {center}},
+  };
   for (const bool moves_lens : {false, true}) {
-    for (const bool at_infinity : {false, true}) {
-      for (const bool joint_pose : {false, true}) {
-        std::vector<std::vector<double>> blocks = {joint_pose ? pose : quaternion};
-        if (!joint_pose && !at_infinity) blocks.push_back(center);
-        blocks.push_back(point);
-        if (moves_lens) blocks.push_back(lens);
-        const ObservationForm form = {joint_pose, at_infinity, moves_lens};
-        ExpectJacobiansAgree(ReprojectionCost(camera, {600.0, 200.0}, 0.7, form), blocks);
-      }
+    for (const auto& [layout, at_infinity, camera_blocks] : cases) {
+      Blocks blocks = camera_blocks;
+      blocks.push_back(point);
+      if (moves_lens) blocks.push_back(lens);
+      ExpectJacobiansAgree(FollowingCost(camera, {layout, at_infinity, moves_lens}), blocks);
     }
   }
 }
@@ -106,15 +150,17 @@ TEST_P(ReprojectionForEveryCamera, JacobiansOfCostsEqualCentralDifferences) {
 // The same residual written for Ceres' automatic derivatives.
 struct AutomaticReprojection {
   Camera camera;
+  Eigen::Matrix3d start;
   Eigen::Vector2d keypoint_px;
   double sigma_px;
 
   template <typename T>
   bool operator()(const T* pose, const T* point, T* residuals) const {
-    const Eigen::Map<const Eigen::Quaternion<T>> q(pose);
-    const Eigen::Map<const Eigen::Vector<T, 3>> center(pose + 4);
+    const Eigen::Map<const Eigen::Vector<T, 3>> center(pose + 3);
     const Eigen::Map<const Eigen::Vector<T, 3>> X(point);
-    const Eigen::Vector<T, 3> p = q.normalized() * Eigen::Vector<T, 3>(X - center);
+    const Eigen::Vector<T, 3> before = start.cast<T>() * Eigen::Vector<T, 3>(X - center);
+    Eigen::Vector<T, 3> p;
+    ceres::AngleAxisRotatePoint(pose, before.data(), p.data());
     const auto& d = camera.distortion;
     T x = p.x() / p.z();
     T y = p.y() / p.z();
@@ -140,15 +186,14 @@ struct AutomaticReprojection {
 
 TEST_P(ReprojectionForEveryCamera, JacobiansEqualAutomaticDerivatives) {
   const Camera camera = BaCamera(GetParam());
-  const Eigen::Vector2d keypoint_px(600.0, 200.0);
-  const ReprojectionCost ours(camera, keypoint_px, 0.7);
-  const ceres::AutoDiffCostFunction<AutomaticReprojection, 2, 7, 3> automatic(
-      new AutomaticReprojection{camera, keypoint_px, 0.7});
-  Eigen::Vector<double, 7> pose;
-  pose << Rotation::Exp({0.3, -0.2, 0.1}).Quaternion().coeffs(), 0.4, -0.3, 0.2;
+  const FollowingCost ours(camera, {});
+  const ceres::AutoDiffCostFunction<AutomaticReprojection, 2, 6, 3> automatic(
+      new AutomaticReprojection{camera, kStart.Matrix(), kKeypoint_px, kSigma_px});
+  Eigen::Vector<double, 6> pose;
+  pose << 0.02, -0.15, 0.1, 0.4, -0.3, 0.2;
   const Eigen::Vector3d point(1.1, -0.7, 4.0);
   const double* const blocks[] = {pose.data(), point.data()};
-  using ByPose = Eigen::Matrix<double, 2, 7, Eigen::RowMajor>;
+  using ByPose = Eigen::Matrix<double, 2, 6, Eigen::RowMajor>;
   using ByPoint = Eigen::Matrix<double, 2, 3, Eigen::RowMajor>;
   ByPose by_pose[2];
   ByPoint by_point[2];
@@ -187,65 +232,51 @@ TEST(WithLens, UndoesLensOfAndTurnsAPinholeIntoRadtanOnlyWhereItBends) {
 }
 
 TEST(ScaleAnchorCost, IsZeroAtTheStartAndItsJacobianEqualsCentralDifferences) {
-  const ScaleAnchorCost cost({1.0, 2.0, 3.0}, {4.0, 6.0, 3.5}, 100.0, false);
+  const ScaleAnchorCost cost({1.0, 2.0, 3.0}, {4.0, 6.0, 3.5}, 100.0, CameraLayout::kApart);
   const double start[3] = {4.0, 6.0, 3.5};
   const double* parameters[1] = {start};
   double residual = 1.0;
   ASSERT_TRUE(cost.Evaluate(parameters, &residual, nullptr));
   EXPECT_NEAR(residual, 0.0, 1e-12);
   ExpectJacobiansAgree(cost, {{3.0, 5.0, 2.0}});
-  ExpectJacobiansAgree(ScaleAnchorCost({1.0, 2.0, 3.0}, {4.0, 6.0, 3.5}, 100.0, true),
-                       {{0.1, 0.2, 0.3, 0.9, 3.0, 5.0, 2.0}});
+  ExpectJacobiansAgree(
+      ScaleAnchorCost({1.0, 2.0, 3.0}, {4.0, 6.0, 3.5}, 100.0, CameraLayout::kPose),
+      {{0.1, 0.2, 0.3, 3.0, 5.0, 2.0}});
 }
 
-TEST(LeftRotationManifold, KeepsCeresLawsOfAManifold) {
-  using namespace ceres;  // the macro below names its matchers without it
-  const LeftRotationManifold manifold;
-  const Eigen::Vector4d q_x = Rotation::Exp({0.5, -1.2, 0.3}).Quaternion().coeffs();
-  const Eigen::Vector4d q_y = Rotation::Exp({0.2, -0.9, 0.8}).Quaternion().coeffs();
-  const Eigen::VectorXd x = q_x;
-  const Eigen::VectorXd y = q_y;
-  const Eigen::VectorXd delta = Eigen::Vector3d(0.1, -0.05, 0.2);
-  EXPECT_THAT_MANIFOLD_INVARIANTS_HOLD(manifold, x, delta, y, 1e-6);
+TEST(LeftJacobian, EqualsCentralDifferences) {
+  for (const double angle : {0.0, 1e-6, 9e-5, 1.1e-4, 0.3, 2.5}) {
+    const Eigen::Vector3d at = angle * Eigen::Vector3d(2.0, -1.0, 2.0) / 3.0;
+    const Eigen::Matrix3d J = LeftJacobian(at);
+    const double step = 1e-4;
+    for (int axis = 0; axis < 3; ++axis) {
+      const Eigen::Vector3d delta = step * Eigen::Vector3d::Unit(axis);
+      const Rotation there = Rotation::Exp(at).Inverse();
+      const Eigen::Vector3d difference =
+          (Rotation::Exp(at + delta) * there).Log() - (Rotation::Exp(at - delta) * there).Log();
+      EXPECT_LT((J.col(axis) - difference / (2.0 * step)).norm(), 1e-8) << angle;
+    }
+  }
 }
 
-TEST(PoseManifold, KeepsCeresLawsOfAManifold) {
-  using namespace ceres;  // the macro below names its matchers without it
-  Eigen::VectorXd x(7);
-  x << Rotation::Exp({0.5, -1.2, 0.3}).Quaternion().coeffs(), 1.0, -2.0, 3.0;
-  Eigen::VectorXd y(7);
-  y << Rotation::Exp({0.2, -0.9, 0.8}).Quaternion().coeffs(), 0.5, 1.0, 2.0;
-  Eigen::VectorXd delta(6);
-  delta << 0.1, -0.05, 0.2, 1.0, -1.0, 0.5;
-  EXPECT_THAT_MANIFOLD_INVARIANTS_HOLD(PoseManifold(), x, delta, y, 1e-6);
-}
-
-TEST(CenterManifold, KeepsCeresLawsOfAManifold) {
-  using namespace ceres;  // the macro below names its matchers without it
-  Eigen::VectorXd x(7);
-  x << Rotation::Exp({0.5, -1.2, 0.3}).Quaternion().coeffs(), 1.0, -2.0, 3.0;
-  Eigen::VectorXd y = x;
-  y.tail<3>() << 0.5, 1.0, 2.0;
-  const Eigen::VectorXd delta = Eigen::Vector3d(1.0, -1.0, 0.5);
-  EXPECT_THAT_MANIFOLD_INVARIANTS_HOLD(CenterManifold(), x, delta, y, 1e-6);
-}
-
-TEST(LeftRotationManifold, ComposesOnTheLeftAsRotationDoes) {
-  const Rotation start = Rotation::Exp({0.5, -1.2, 0.3});
-  const Eigen::Vector3d delta(0.1, -0.05, 0.2);
-  Eigen::Quaterniond plus;
-  ASSERT_TRUE(LeftRotationManifold().Plus(
-      start.Quaternion().coeffs().data(), delta.data(), plus.coeffs().data()));
-  EXPECT_LT((Rotation(plus) * (Rotation::Exp(delta) * start).Inverse()).Angle(), 1e-14);
+TEST(TurnedRotation, IsComposedOnTheLeft) {
+  TurnedRotation rotation(kStart);
+  EXPECT_EQ(rotation.R_c_w(), kStart.Matrix());
+  const Eigen::Vector3d turn(0.1, -0.05, 0.2);
+  rotation.Turn(turn);
+  EXPECT_EQ(rotation.R_c_w(), (Rotation::Exp(turn) * kStart).Matrix());
+  EXPECT_EQ(rotation.R_c_w(), rotation.At(turn).Matrix());
 }
 
 TEST(ReprojectionCost, PointBehindTheCameraCostsButDoesNotPull) {
   const Camera camera = BaCamera();
-  const ReprojectionCost cost(camera, {600.0, 200.0}, 2.0, {.joint_pose = false});
-  const double q[4] = {0.0, 0.0, 0.0, 1.0};
+  const TurnedRotation rotation{Rotation()};
+  const ReprojectionCost cost(
+      camera, camera, rotation, {600.0, 200.0}, 2.0, {.camera = CameraLayout::kApart});
+  const double turn[3] = {0.0, 0.0, 0.0};
   const double center[3] = {0.0, 0.0, 0.0};
   const double point[3] = {0.1, 0.2, -3.0};
-  const double* parameters[3] = {q, center, point};
+  const double* parameters[3] = {turn, center, point};
   double residuals[2];
   double J_point[6];
   double* jacobians[3] = {nullptr, nullptr, J_point};
