@@ -57,9 +57,8 @@ struct Products {
   Fives yr, zs;
 };
 
-// First iterate at `x`: exactly central, y r = z s = mu. A generous mu makes the first steps long.
-Iterate Start(const Program& program, Eigen::VectorXd x) {
-  constexpr double kFirstMu = 10.0;
+// First iterate at `x`: exactly central, y r = z s = mu.
+Iterate Start(const Program& program, Eigen::VectorXd x, double mu) {
   Iterate at;
   at.x = std::move(x);
   const int count = program.size();
@@ -70,13 +69,13 @@ Iterate Start(const Program& program, Eigen::VectorXd x) {
   for (int o = 0; o < count; ++o) {
     // r - s = room and 1 / r + 1 / s = price / mu.
     const Five room = program.Room(o, at.x);
-    const Five m = kFirstMu / program.Price(o);
+    const Five m = mu / program.Price(o);
     const Five root = (room.square() + 4.0 * m.square()).sqrt();
     const Five less = m + 2.0 * m.square() / (root + room.abs());  // the smaller of r and s
     at.r[o] = less + room.max(0.0);
     at.s[o] = less - room.min(0.0);
-    at.y[o] = kFirstMu / at.r[o];
-    at.z[o] = kFirstMu / at.s[o];
+    at.y[o] = mu / at.r[o];
+    at.z[o] = mu / at.s[o];
   }
   return at;
 }
@@ -303,7 +302,8 @@ MinimaxLpResult SolveL1SlackInterior(const MinimaxProblem& problem,
     const Program program(problem, gamma, depth_price, weights);
     Iterate at = Start(program,
                        start == nullptr ? PointsAround(problem, program.layout())
-                                        : Packed(program.layout(), *start));
+                                        : Packed(program.layout(), *start),
+                       options.first_product);
     result.call = Converge(problem, program, depth_price, options, at, result.iterations);
     result.structure = Unpacked(program.layout(), at.x);
     result.objective = Objective(program, at);

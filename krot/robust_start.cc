@@ -35,18 +35,26 @@ std::vector<double> NextWeights(const MinimaxProblem& problem,
   return weights;
 }
 
+// @param given   where fixed views and points are.
+// @param before  the answer to the program before.
 MinimaxLpResult SolveProgram(const MinimaxProblem& problem,
                              double gamma,
                              const std::vector<double>& weights,
                              const RobustStartOptions& options,
                              double tolerance,
-                             const MinimaxStructure* start) {
-  if (options.method == "interior" || start != nullptr) {
+                             const MinimaxStructure* given,
+                             const MinimaxStructure* before) {
+  if (options.method == "interior" || given != nullptr) {
     L1InteriorOptions interior;
     interior.tolerance = tolerance;
-    MinimaxLpResult result =
-        SolveL1SlackInterior(problem, gamma, options.depth_price, weights, interior, start);
-    if (result.call == LpCallStatus::kCompleted || start != nullptr) return result;
+    if (before != nullptr) interior.first_product = 1e-3;
+    MinimaxLpResult result = SolveL1SlackInterior(problem,
+                                                  gamma,
+                                                  options.depth_price,
+                                                  weights,
+                                                  interior,
+                                                  before != nullptr ? before : given);
+    if (result.call == LpCallStatus::kCompleted || given != nullptr) return result;
   }
   return SolveL1Slack(problem, gamma, options.depth_price, weights, options.lp);
 }
@@ -60,7 +68,9 @@ bool SolveRound(const MinimaxProblem& problem,
                 RobustStart& start) {
   // The rounds' answers only set prices.
   const double tolerance = gamma > 0.0 ? 1e-3 : 1e-6;
-  MinimaxLpResult lp = SolveProgram(problem, gamma, weights, options, tolerance, given);
+  const MinimaxStructure* const before =
+      start.call == LpCallStatus::kCompleted ? &start.structure : nullptr;
+  MinimaxLpResult lp = SolveProgram(problem, gamma, weights, options, tolerance, given, before);
   ++start.num_programs;
   if (lp.call != LpCallStatus::kCompleted) return false;
   start.call = lp.call;
