@@ -32,7 +32,7 @@ std::optional<Eigen::Vector2d> Reproject(const Camera& camera,
 /// Residual of a point the model cannot project (behind the camera, beyond the fold), per axis and
 /// in pixels, with zero derivative: a step that pushes a few bad points behind a camera costs
 /// something but is not refused for their sake, and they fall at the next classification.
-inline constexpr double kUnseenResidual_px = 1e3;
+inline constexpr double kUnseenResidual_px = 20.0;
 
 /// A frame's orientation while a minimisation moves it: Exp(turn) * start, in exponential
 /// coordinates about where it starts. What all observations of the frame have in common is worked
