@@ -45,6 +45,7 @@ class Program : public HalfSpaces {
 struct Iterate {
   Eigen::VectorXd x;
   Fives r, s, y, z;
+  double imbalance = 1.0;  // A^T y, as a share of the first one
 };
 
 struct Step {
@@ -184,6 +185,7 @@ void Advance(const Program& program, const Step& step, double primal, double dua
     at.y[o] += dual * step.y[o];
     at.z[o] += dual * step.z[o];
   }
+  at.imbalance *= 1.0 - dual;
 }
 
 bool Finite(const Step& step) {
@@ -278,7 +280,8 @@ LpCallStatus Converge(const MinimaxProblem& problem,
   StructureSystem system(problem);
   for (iterations = 0; iterations < options.max_iterations; ++iterations) {
     const double enough = options.tolerance * (Objective(program, at) + depth_price);
-    if (Complementarity(at) <= enough) return LpCallStatus::kCompleted;
+    const bool balanced = at.imbalance <= options.tolerance;
+    if (balanced && Complementarity(at) <= enough) return LpCallStatus::kCompleted;
     if (!NewtonStep(program, system, at)) break;
   }
   return LpCallStatus::kFailed;
