@@ -1,7 +1,6 @@
 #include "krot/epipolar_filter.h"
 
 #include <algorithm>
-#include <cmath>
 #include <map>
 #include <utility>
 
@@ -20,20 +19,22 @@ struct SharedTrack {
   Eigen::Vector3d normal;  // ray_a x ray_b, as long as the sine of the parallax
 };
 
-// Angle by which the two rays miss a common plane with `direction`; the smaller of the two ways to
-// measure it, so a ray near the epipole does not blow it up.
-double PlaneError(const SharedTrack& shared, const Eigen::Vector3d& direction) {
-  const double volume = std::abs(shared.normal.dot(direction));
-  const double sine =
-      std::max(direction.cross(shared.ray_a).norm(), direction.cross(shared.ray_b).norm());
-  return volume / std::max(sine, 1e-12);
+// Whether the two rays miss a common plane with `direction`, which is a unit vector, by an angle of
+// at most `threshold`; the smaller of the two ways to measure it, so a ray near the epipole does
+// not blow it up.
+bool ShareAPlane(const SharedTrack& shared, const Eigen::Vector3d& direction, double threshold) {
+  const double volume = shared.normal.dot(direction);
+  const double cosine_a = direction.dot(shared.ray_a);
+  const double cosine_b = direction.dot(shared.ray_b);
+  const double squared_sine = 1.0 - std::min(cosine_a * cosine_a, cosine_b * cosine_b);
+  return volume * volume <= threshold * threshold * squared_sine;
 }
 
 int CountInliers(const std::vector<SharedTrack>& shared,
                  const Eigen::Vector3d& direction,
                  double threshold) {
   int count = 0;
-  for (const SharedTrack& track : shared) count += PlaneError(track, direction) <= threshold;
+  for (const SharedTrack& track : shared) count += ShareAPlane(track, direction, threshold);
   return count;
 }
 
@@ -124,7 +125,7 @@ std::vector<ObservationIndex> FindEpipolarOutliers(const RotationMap& cam_from_w
     const int agreeing = CountInliers(shared, direction, options.threshold_rad);
     if (2 * agreeing < static_cast<int>(shared.size())) continue;
     for (const SharedTrack& track : shared) {
-      const int vote = PlaneError(track, direction) <= options.threshold_rad ? -1 : 1;
+      const int vote = ShareAPlane(track, direction, options.threshold_rad) ? -1 : 1;
       balance[track.first] += vote;
       balance[track.second] += vote;
     }
