@@ -286,6 +286,17 @@ void RemoveWeakFrames(const Classifier& classifier, int min_observations, Bundle
   }
 }
 
+// Calls visit(track, sight, error_px) for what points and directions are made of.
+template <class Visit>
+void ForEachUsedSight(const BundleState& state, const Visit& visit) {
+  for (const TrackState& track : state.tracks) {
+    if (track.kind == TrackKind::kOut) continue;
+    for (const Sight& sight : track.sights) {
+      if (sight.used) visit(track, sight, ErrorPx(state, track, sight, track.position));
+    }
+  }
+}
+
 }  // namespace
 
 void ClassifyAll(const BundleRound& round,
@@ -309,17 +320,14 @@ void ClassifyAll(const BundleRound& round,
 
 double ResidualSpread(const BundleState& state) {
   std::vector<double> residuals;
+  ForEachUsedSight(state, [&](const TrackState& /*track*/, const Sight& sight, double error_px) {
+    residuals.push_back(error_px / sight.observation->sigma_px);
+  });
+  if (residuals.empty()) return 0.0;
   std::size_t num_free = 0;
   for (const TrackState& track : state.tracks) {
-    if (track.kind == TrackKind::kOut) continue;
-    num_free += track.kind == TrackKind::kPoint ? 3 : 2;
-    for (const Sight& sight : track.sights) {
-      if (!sight.used) continue;
-      residuals.push_back(ErrorPx(state, track, sight, track.position) /
-                          sight.observation->sigma_px);
-    }
+    if (track.kind != TrackKind::kOut) num_free += track.kind == TrackKind::kPoint ? 3 : 2;
   }
-  if (residuals.empty()) return 0.0;
   const auto middle = residuals.begin() + static_cast<std::ptrdiff_t>(residuals.size() / 2);
   std::nth_element(residuals.begin(), middle, residuals.end());
   // Two observations or more to a track: a quarter of the measurements or more.
@@ -334,33 +342,28 @@ BundleSupport SupportWithin(const BundleRound& round,
   const std::unique_ptr<ceres::LossFunction> loss = MakeLoss(round);
   std::vector<bool> frame_sees(state.frames.size(), false);
   BundleSupport support;
-  for (const TrackState& track : state.tracks) {
-    if (track.kind != TrackKind::kPoint) continue;
-    ++support.num_points;
-    for (const Sight& sight : track.sights) {
-      if (!sight.used) continue;
-      ++support.num_observations;
-      frame_sees[sight.frame] = true;
-      const double sigmas =
-          ErrorPx(state, track, sight, track.position) / sight.observation->sigma_px;
-      double rho[3] = {sigmas * sigmas, 1.0, 0.0};
-      if (loss) loss->Evaluate(sigmas * sigmas, rho);
-      support.cost += 0.5 * rho[0];
-    }
-  }
+  ForEachUsedSight(state, [&](const TrackState& track, const Sight& sight, double error_px) {
+    if (track.kind != TrackKind::kPoint) return;
+    ++support.num_observations;
+    frame_sees[sight.frame] = true;
+    const double sigmas = error_px / sight.observation->sigma_px;
+    double rho[3] = {sigmas * sigmas, 1.0, 0.0};
+    if (loss) loss->Evaluate(sigmas * sigmas, rho);
+    support.cost += 0.5 * rho[0];
+  });
+  support.num_points = static_cast<int>(
+      std::count_if(state.tracks.begin(), state.tracks.end(), [](const TrackState& track) {
+        return track.kind == TrackKind::kPoint;
+      }));
   support.num_frames = static_cast<int>(std::count(frame_sees.begin(), frame_sees.end(), true));
   return support;
 }
 
 ResidualStatistics Statistics(const BundleState& state) {
   std::vector<double> errors_px;
-  for (const TrackState& track : state.tracks) {
-    if (track.kind != TrackKind::kPoint) continue;
-    for (const Sight& sight : track.sights) {
-      if (!sight.used) continue;
-      errors_px.push_back(ErrorPx(state, track, sight, track.position));
-    }
-  }
+  ForEachUsedSight(state, [&](const TrackState& track, const Sight& /*sight*/, double error_px) {
+    if (track.kind == TrackKind::kPoint) errors_px.push_back(error_px);
+  });
   ResidualStatistics statistics;
   statistics.num_observations = static_cast<int>(errors_px.size());
   if (errors_px.empty()) return statistics;
