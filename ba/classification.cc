@@ -71,7 +71,9 @@ class Classifier {
     Best best;
     if (track.has_position) Offer(track, track.position, best);
     if (best.num_misfits > 0) {
-      if (anywhere) Search(track, best);
+      // A step can have thrown a point behind all cameras.
+      const bool is_lost = track.has_position && best.verdict.num_fits == 0;
+      if (anywhere || is_lost) Search(track, best);
       Settle(track, best);
     }
     track.has_position = best.position.has_value();
