@@ -72,7 +72,7 @@ class Classifier {
     if (track.has_position) Offer(track, track.position, best);
     if (best.num_misfits > 0) {
       // A step can have thrown a point behind all cameras.
-      const bool is_lost = track.has_position && best.verdict.num_fits == 0;
+      const bool is_lost = track.kind != TrackKind::kOut && best.verdict.num_fits == 0;
       if (anywhere || is_lost) Search(track, best);
       Settle(track, best);
     }

@@ -44,16 +44,14 @@ MinimaxLpResult SolveProgram(const MinimaxProblem& problem,
                              double tolerance,
                              const MinimaxStructure* given,
                              const MinimaxStructure* before) {
+  // Half the iterations of one that starts from nothing (L1InteriorOptions).
+  constexpr double kFirstProductNearby = 1e-3;
   if (options.method == "interior" || given != nullptr) {
     L1InteriorOptions interior;
     interior.tolerance = tolerance;
-    if (before != nullptr) interior.first_product = 1e-3;
-    MinimaxLpResult result = SolveL1SlackInterior(problem,
-                                                  gamma,
-                                                  options.depth_price,
-                                                  weights,
-                                                  interior,
-                                                  before != nullptr ? before : given);
+    if (before != nullptr) interior.first_product = kFirstProductNearby;
+    MinimaxLpResult result = SolveL1SlackInterior(
+        problem, gamma, options.depth_price, weights, interior, before != nullptr ? before : given);
     if (result.call == LpCallStatus::kCompleted || given != nullptr) return result;
   }
   return SolveL1Slack(problem, gamma, options.depth_price, weights, options.lp);
