@@ -138,7 +138,7 @@ bool ReprojectionCost::Evaluate(double const* const* parameters,
   const double weight = 1.0 / sigma_px_;
   ReprojectionJacobian J;
   const std::optional<Eigen::Vector2d> pixel =
-      Reproject(camera_, rotation_.R_c_w(), center, point, blocks.WantJacobians() ? &J : nullptr);
+      Reproject(camera_, rotation_.Matrix(), center, point, blocks.WantJacobians() ? &J : nullptr);
   if (!pixel) {
     J.by_rotation.setZero();
     J.by_center.setZero();
@@ -149,7 +149,7 @@ bool ReprojectionCost::Evaluate(double const* const* parameters,
                    : Eigen::Vector2d::Constant(weight * kUnseenResidual_px);
   if (blocks.J_turn != nullptr) {
     Columns<3>(blocks.J_turn, blocks.camera_stride).noalias() =
-        weight * J.by_rotation * rotation_.J_turn();
+        weight * J.by_rotation * rotation_.Jacobian();
   }
   if (blocks.J_center != nullptr) {
     if (form_.at_infinity) J.by_center.setZero();
@@ -159,8 +159,8 @@ bool ReprojectionCost::Evaluate(double const* const* parameters,
   if (blocks.J_lens != nullptr) {
     auto J_lens = Columns<6>(blocks.J_lens, 6);
     if (pixel) {
-      J_lens =
-          weight * LensJacobian(camera_, calibrated_, rotation_.R_c_w() * (point - center), *pixel);
+      J_lens = weight *
+               LensJacobian(camera_, calibrated_, rotation_.Matrix() * (point - center), *pixel);
     } else {
       J_lens.setZero();
     }

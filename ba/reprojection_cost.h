@@ -48,9 +48,9 @@ class TurnedRotation {
   Rotation At(const Eigen::Vector3d& turn) const { return Rotation::Exp(turn) * start_; }
 
   // As of the last turn.
-  const Eigen::Matrix3d& R_c_w() const { return R_c_w_; }
+  const Eigen::Matrix3d& Matrix() const { return R_c_w_; }
   // d(delta) / d(turn), where Exp(delta) * R_c_w is where a small change of the turn leads.
-  const Eigen::Matrix3d& J_turn() const { return J_turn_; }
+  const Eigen::Matrix3d& Jacobian() const { return J_turn_; }
 
  private:
   Rotation start_;

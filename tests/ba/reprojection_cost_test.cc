@@ -261,11 +261,11 @@ TEST(LeftJacobian, EqualsCentralDifferences) {
 
 TEST(TurnedRotation, IsComposedOnTheLeft) {
   TurnedRotation rotation(kStart);
-  EXPECT_EQ(rotation.R_c_w(), kStart.Matrix());
+  EXPECT_EQ(rotation.Matrix(), kStart.Matrix());
   const Eigen::Vector3d turn(0.1, -0.05, 0.2);
   rotation.Turn(turn);
-  EXPECT_EQ(rotation.R_c_w(), (Rotation::Exp(turn) * kStart).Matrix());
-  EXPECT_EQ(rotation.R_c_w(), rotation.At(turn).Matrix());
+  EXPECT_EQ(rotation.Matrix(), (Rotation::Exp(turn) * kStart).Matrix());
+  EXPECT_EQ(rotation.Matrix(), rotation.At(turn).Matrix());
 }
 
 TEST(ReprojectionCost, PointBehindTheCameraCostsButDoesNotPull) {
