@@ -209,8 +209,9 @@ class Rounds {
       result_.message = "round " + name + ": " + solved.message;
       return;
     }
-    result_.status = solved.termination_type == ceres::CONVERGENCE ? BundleStatus::kConverged
-                                                                   : BundleStatus::kIterationLimit;
+    result_.status = solved.termination_type == ceres::NO_CONVERGENCE
+                         ? BundleStatus::kIterationLimit
+                         : BundleStatus::kConverged;
   }
 
   const Camera& calibrated_;

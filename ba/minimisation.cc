@@ -7,6 +7,7 @@
 #include <vector>
 
 #include <ceres/evaluation_callback.h>
+#include <ceres/iteration_callback.h>
 #include <ceres/ordered_groups.h>
 #include <ceres/problem.h>
 #include <ceres/sphere_manifold.h>
@@ -119,6 +120,30 @@ class CameraBlocks final : public ceres::EvaluationCallback {
   bool moves_lens_ = false;
 };
 
+// Ends a minimisation when what is still to come is less than a share of the cost, if each step
+// goes on to gain a part of what the one before gained. Ceres itself works a whole step out to see
+// that it was not worth it.
+class Arrival final : public ceres::IterationCallback {
+ public:
+  explicit Arrival(double tolerance) : tolerance_(tolerance) {}
+
+  ceres::CallbackReturnType operator()(const ceres::IterationSummary& step) override {
+    if (step.iteration == 0 || !step.step_is_successful) return ceres::SOLVER_CONTINUE;
+    const double ratio = gain_ > 0.0 ? step.cost_change / gain_ : 1.0;
+    // Of the last two: the first steps gain quadratically, the later ones do not.
+    const double slower = std::max(ratio, ratio_);
+    gain_ = step.cost_change;
+    ratio_ = ratio < 1.0 ? ratio : 0.0;
+    const bool ends = slower < 1.0 && gain_ * slower / (1.0 - slower) < tolerance_ * step.cost;
+    return ends ? ceres::SOLVER_TERMINATE_SUCCESSFULLY : ceres::SOLVER_CONTINUE;
+  }
+
+ private:
+  double tolerance_;
+  double gain_ = 0.0;   // of the last step
+  double ratio_ = 0.0;  // of its gain to that of the one before
+};
+
 // The used observations as a Ceres problem over the state's own numbers.
 class Minimisation {
  public:
@@ -131,7 +156,8 @@ class Minimisation {
         refine_rotations_(round.refine_rotations && options.refine_rotations),
         refine_lens_(refine_lens),
         state_(state),
-        loss_(MakeLoss(round)),
+        huber_bend_(round.loss == "huber" ? round.loss_scale : 0.0),
+        loss_(huber_bend_ > 0.0 ? nullptr : MakeLoss(round)),
         cameras_(state, calibrated, refine_rotations_),
         problem_(ProblemOptions(cameras_)),
         frame_used_(state.frames.size(), false),
@@ -162,6 +188,8 @@ class Minimisation {
     options.initial_trust_region_radius = round.initial_radius;
     options.max_trust_region_radius = kMaxTrustRegionRadius;
     options.logging_type = ceres::SILENT;
+    Arrival arrival(round.function_tolerance);
+    options.callbacks.push_back(&arrival);
     ceres::Solver::Summary summary;
     ceres::Solve(options, &problem_, &summary);
     TakeCameras();
@@ -273,6 +301,7 @@ class Minimisation {
                         cameras_.RotationOf(sight.frame),
                         observation.keypoint_px,
                         observation.sigma_px,
+                        huber_bend_,
                         form);
     std::array<double*, 4> blocks;
     int num_blocks = 0;
@@ -391,7 +420,8 @@ class Minimisation {
   const bool refine_rotations_;
   const bool refine_lens_;
   BundleState& state_;
-  std::unique_ptr<ceres::LossFunction> loss_;
+  const double huber_bend_;                    // 0: another loss
+  std::unique_ptr<ceres::LossFunction> loss_;  // null: Huber's, or none
   ceres::SphereManifold<3> directions_;
   std::deque<ReprojectionCost> costs_;
   std::unique_ptr<LensPriorCost> lens_prior_;

@@ -5,6 +5,8 @@
 
 #include <Eigen/Geometry>
 
+#include "ba/loss.h"
+
 namespace rotslam {
 namespace {
 
@@ -109,12 +111,14 @@ ReprojectionCost::ReprojectionCost(const Camera& camera,
                                    const TurnedRotation& rotation,
                                    const Eigen::Vector2d& keypoint_px,
                                    double sigma_px,
+                                   double huber_bend,
                                    const ObservationForm& form)
     : camera_(camera),
       calibrated_(calibrated),
       rotation_(rotation),
       keypoint_px_(keypoint_px),
       sigma_px_(sigma_px),
+      huber_bend_(huber_bend),
       form_(form) {
   set_num_residuals(2);
   std::vector<std::int32_t>& sizes = *mutable_parameter_block_sizes();
@@ -135,7 +139,6 @@ bool ReprojectionCost::Evaluate(double const* const* parameters,
   const Blocks blocks = BlocksOf(form_, parameters, jacobians);
   const Eigen::Map<const Eigen::Vector3d> center(blocks.center);
   const Eigen::Map<const Eigen::Vector3d> point(blocks.point);
-  const double weight = 1.0 / sigma_px_;
   ReprojectionJacobian J;
   const std::optional<Eigen::Vector2d> pixel =
       Reproject(camera_, rotation_.Matrix(), center, point, blocks.WantJacobians() ? &J : nullptr);
@@ -144,23 +147,27 @@ bool ReprojectionCost::Evaluate(double const* const* parameters,
     J.by_center.setZero();
     J.by_point.setZero();
   }
-  Eigen::Map<Eigen::Vector2d> residual(residuals);
-  residual = pixel ? Eigen::Vector2d(weight * (*pixel - keypoint_px_))
-                   : Eigen::Vector2d::Constant(weight * kUnseenResidual_px);
+  const RobustResidual robust =
+      UnderHuberLoss(pixel ? Eigen::Vector2d((*pixel - keypoint_px_) / sigma_px_)
+                           : Eigen::Vector2d::Constant(kUnseenResidual_px / sigma_px_),
+                     huber_bend_);
+  Eigen::Vector2d::Map(residuals) = robust.value;
+  const Eigen::Matrix2d weight = robust.weight / sigma_px_;
   if (blocks.J_turn != nullptr) {
-    Columns<3>(blocks.J_turn, blocks.camera_stride).noalias() =
-        weight * J.by_rotation * rotation_.Jacobian();
+    const Eigen::Matrix<double, 2, 3> J_turn = J.by_rotation * rotation_.Jacobian();
+    Columns<3>(blocks.J_turn, blocks.camera_stride).noalias() = weight * J_turn;
   }
   if (blocks.J_center != nullptr) {
     if (form_.at_infinity) J.by_center.setZero();
-    Columns<3>(blocks.J_center, blocks.camera_stride) = weight * J.by_center;
+    Columns<3>(blocks.J_center, blocks.camera_stride).noalias() = weight * J.by_center;
   }
-  if (blocks.J_point != nullptr) Columns<3>(blocks.J_point, 3) = weight * J.by_point;
+  if (blocks.J_point != nullptr) Columns<3>(blocks.J_point, 3).noalias() = weight * J.by_point;
   if (blocks.J_lens != nullptr) {
     auto J_lens = Columns<6>(blocks.J_lens, 6);
     if (pixel) {
-      J_lens = weight *
-               LensJacobian(camera_, calibrated_, rotation_.Matrix() * (point - center), *pixel);
+      J_lens.noalias() =
+          weight *
+          LensJacobian(camera_, calibrated_, rotation_.Matrix() * (point - center), *pixel);
     } else {
       J_lens.setZero();
     }

@@ -4,7 +4,6 @@
 
 #include <Eigen/Core>
 #include <ceres/cost_function.h>
-#include <ceres/sized_cost_function.h>
 
 #include "ba/lens.h"
 #include "rotodom/camera/camera.h"
@@ -80,19 +79,22 @@ struct ObservationForm {
   bool moves_lens = false;
 };
 
-/// (Project(R_c_w (point - center)) - keypoint_px) / sigma_px.
+/// (Project(R_c_w (point - center)) - keypoint_px) / sigma_px, under Huber's loss: see
+/// UnderHuberLoss. Its derivatives are what steps are taken with, exact up to the loss' bend.
 class ReprojectionCost final : public ceres::CostFunction {
  public:
   /// @param camera      with the lens that the parameters say,
   /// @param rotation    turned as the parameters say: the caller keeps both so (see
   ///                    ceres::EvaluationCallback).
   /// @param calibrated  what LensParameters refer to.
-  /// All three must outlive the cost function.
+  /// @param huber_bend  of Huber's loss, in sigmas; 0: no loss.
+  /// The first three must outlive the cost function.
   ReprojectionCost(const Camera& camera,
                    const Camera& calibrated,
                    const TurnedRotation& rotation,
                    const Eigen::Vector2d& keypoint_px,
                    double sigma_px,
+                   double huber_bend = 0.0,
                    const ObservationForm& form = {});
   bool Evaluate(double const* const* parameters,
                 double* residuals,
@@ -104,6 +106,7 @@ class ReprojectionCost final : public ceres::CostFunction {
   const TurnedRotation& rotation_;
   Eigen::Vector2d keypoint_px_;
   double sigma_px_;
+  double huber_bend_;
   ObservationForm form_;
 };
 

@@ -91,7 +91,7 @@ class FollowingCost final : public ceres::CostFunction {
         camera_(calibrated),
         rotation_(kStart),
         form_(form),
-        cost_(camera_, calibrated_, rotation_, kKeypoint_px, kSigma_px, form) {
+        cost_(camera_, calibrated_, rotation_, kKeypoint_px, kSigma_px, 0.0, form) {
     set_num_residuals(cost_.num_residuals());
     *mutable_parameter_block_sizes() = cost_.parameter_block_sizes();
   }
@@ -272,7 +272,7 @@ TEST(ReprojectionCost, PointBehindTheCameraCostsButDoesNotPull) {
   const Camera camera = BaCamera();
   const TurnedRotation rotation{Rotation()};
   const ReprojectionCost cost(
-      camera, camera, rotation, {600.0, 200.0}, 2.0, {.camera = CameraLayout::kApart});
+      camera, camera, rotation, {600.0, 200.0}, 2.0, 0.0, {.camera = CameraLayout::kApart});
   const double turn[3] = {0.0, 0.0, 0.0};
   const double center[3] = {0.0, 0.0, 0.0};
   const double point[3] = {0.1, 0.2, -3.0};
