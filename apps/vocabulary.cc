@@ -2,14 +2,12 @@
 #include <chrono>
 #include <cstdio>
 #include <filesystem>
-#include <fstream>
-#include <iterator>
 #include <memory>
 #include <stdexcept>
 #include <string>
 #include <vector>
 
-#include <opencv2/imgcodecs.hpp>
+#include <opencv2/core/mat.hpp>
 
 #include "apps/command.h"
 #include "apps/progress.h"
@@ -18,6 +16,7 @@
 #include "rotodom/loop/default_vocabulary.h"
 #include "rotodom/loop/training.h"
 #include "rotodom/loop/vocabulary_file.h"
+#include "rotodom/sequence/image_file.h"
 #include "rotodom/sequence/layout.h"
 #include "rotodom/types/parallel.h"
 
@@ -86,26 +85,12 @@ Camera NeutralCamera(const cv::Mat& image) {
   return camera;
 }
 
-// cv::imread would print lines of its own.
-cv::Mat ReadImage(const std::filesystem::path& file) {
-  std::ifstream stream(file, std::ios::binary);
-  const std::vector<char> bytes{std::istreambuf_iterator<char>(stream), {}};
-  cv::Mat image;
-  try {
-    if (!bytes.empty()) image = cv::imdecode(bytes, cv::IMREAD_GRAYSCALE);
-  } catch (const cv::Exception&) {
-    image.release();  // an absurd header, which OpenCV reports as its own error
-  }
-  if (image.empty()) {
-    throw std::runtime_error(file.string() +
-                             ": cannot be read as an image; name images or folders of them");
-  }
-  return image;
-}
-
 std::vector<BinaryDescriptor> DescribeImage(const std::filesystem::path& file,
                                             const FeatureOptions& options) {
-  const cv::Mat image = ReadImage(file);
+  const auto [image, problem] = ReadImageFile(file);
+  if (!problem.empty()) {
+    throw std::runtime_error(file.string() + ": " + problem + "; name images or folders of them");
+  }
   const Features features = ExtractFeatures(image, FrameId{0}, NeutralCamera(image), options, 1);
   return ToBinaryDescriptors(features.descriptors);
 }

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <array>
+#include <cctype>
 #include <cstddef>
 #include <cstdint>
 #include <fstream>
@@ -28,11 +29,14 @@ std::uint32_t Number32At(const Bytes& bytes, std::size_t at) {
   return Number16At(bytes, at) << 16 | Number16At(bytes, at + 2);
 }
 
+bool Has(const Bytes& bytes, std::size_t at, std::string_view letters) {
+  const std::string_view text(reinterpret_cast<const char*>(bytes.data()), bytes.size());
+  return at <= text.size() && text.substr(at).starts_with(letters);
+}
+
 // ---- JPEG
 
-bool IsJpeg(const Bytes& bytes) {
-  return bytes.size() >= 4 && bytes[0] == 0xff && bytes[1] == 0xd8;
-}
+bool IsJpeg(const Bytes& bytes) { return Has(bytes, 0, "\xff\xd8\xff"); }
 
 // Pixels that the first frame header claims, where its entropy code is Huffman's; else 0.
 std::uint64_t ClaimedPixelsOfJpeg(const Bytes& bytes) {
@@ -86,14 +90,14 @@ std::uint64_t ClaimedBytesOfPng(const Bytes& bytes, std::size_t at) {
   return pixels / 8 * std::min<std::uint64_t>(bits, 64);
 }
 
-// What is wrong with the chunks of a PNG file; empty when nothing is, or when it is no PNG file.
-// The decoder takes damaged pixels for good ones, and complains on stderr by itself.
+bool IsPng(const Bytes& bytes) { return Has(bytes, 0, "\x89PNG\r\n\x1a\n"); }
+
+// What is wrong with the chunks of a PNG file; empty when nothing is. The decoder takes damaged
+// pixels for good ones, and complains on stderr by itself.
 std::string DamageOfPng(const Bytes& bytes) {
-  constexpr unsigned char kSignature[] = {0x89, 'P', 'N', 'G', '\r', '\n', 0x1a, '\n'};
   constexpr unsigned char kHeader[] = {'I', 'H', 'D', 'R'};
   constexpr unsigned char kEnd[] = {'I', 'E', 'N', 'D'};
   constexpr std::uint64_t kMostBytesPerByte = 1032;  // that deflate can make
-  if (bytes.size() < 8 || !std::equal(kSignature, kSignature + 8, bytes.begin())) return {};
   // A chunk is its length, type, that many bytes, and the CRC of type and bytes.
   for (std::size_t at = 8; at + 12 <= bytes.size();) {
     const std::size_t length = Number32At(bytes, at);
@@ -122,17 +126,14 @@ std::uint32_t LittleNumberAt(const Bytes& bytes, std::size_t at, int num_bytes) 
   return number;
 }
 
-// Pixels that the header claims, in its container or bare, as the decoder takes both; else 0.
+bool IsWebp(const Bytes& bytes) { return Has(bytes, 0, "RIFF") && Has(bytes, 8, "WEBP"); }
+
+// Pixels that the header claims; else 0.
 std::uint64_t ClaimedPixelsOfWebp(const Bytes& bytes) {
-  const std::string_view text(reinterpret_cast<const char*>(bytes.data()), bytes.size());
-  const auto has = [text](std::size_t at, std::string_view letters) {
-    return at <= text.size() && text.substr(at).starts_with(letters);
-  };
-  std::size_t at = 0;
   // "RIFF", the file's length, "WEBP", then chunks: four letters, their length, that many bytes.
-  if (has(0, "RIFF") && has(8, "WEBP")) at = 20;
+  constexpr std::size_t at = 20;
   if (bytes.size() < at + 10) return 0;
-  if (at > 0 && has(12, "VP8X")) {
+  if (Has(bytes, 12, "VP8X")) {
     return (std::uint64_t{1} + LittleNumberAt(bytes, at + 4, 3)) *
            (1 + LittleNumberAt(bytes, at + 7, 3));
   }
@@ -140,7 +141,7 @@ std::uint64_t ClaimedPixelsOfWebp(const Bytes& bytes) {
     const std::uint32_t bits = LittleNumberAt(bytes, at + 1, 4);
     return std::uint64_t{1 + (bits & 0x3fff)} * (1 + (bits >> 14 & 0x3fff));
   }
-  if (!has(at + 3, "\x9d\x01\x2a")) return 0;
+  if (!Has(bytes, at + 3, "\x9d\x01\x2a")) return 0;
   return std::uint64_t{LittleNumberAt(bytes, at + 6, 2) & 0x3fff} *
          (LittleNumberAt(bytes, at + 8, 2) & 0x3fff);
 }
@@ -154,6 +155,18 @@ bool IsCutOffWebp(const Bytes& bytes) {
 }
 
 // ---- any
+
+// Whether the file begins as one of the formats that are read here. OpenCV would offer any other to
+// whatever it was built with: geographic formats that name further files and addresses to read, and
+// medical ones whose reader ends the program where it does not understand a file.
+bool IsKnownFormat(const Bytes& bytes) {
+  // A damaged WebP file goes on to the medical reader when it has its mark.
+  if (IsWebp(bytes)) return ClaimedPixelsOfWebp(bytes) > 0 && !Has(bytes, 128, "DICM");
+  const bool is_tiff = Has(bytes, 0, {"II\x2a\0", 4}) || Has(bytes, 0, {"MM\0\x2a", 4});
+  const bool is_pnm = bytes.size() >= 3 && bytes[0] == 'P' && bytes[1] >= '1' && bytes[1] <= '6' &&
+                      std::isspace(bytes[2]) != 0;
+  return IsJpeg(bytes) || IsPng(bytes) || is_tiff || is_pnm || Has(bytes, 0, "BM");
+}
 
 DecodedImage Failed(std::string problem) { return {{}, std::move(problem)}; }
 
@@ -185,9 +198,12 @@ DecodedImage ReadImageFile(const std::filesystem::path& file) {
   }
   if (!stream.is_open() || stream.bad()) return Failed("file cannot be opened");
   if (bytes.empty()) return Failed("file is empty");
+  if (!IsKnownFormat(bytes)) return Failed("not a PNG, JPEG, TIFF, BMP, PNM or WebP file");
   if (IsJpeg(bytes) && IsCutOffJpeg(bytes)) return Failed("JPEG data are cut off");
-  if (std::string damage = DamageOfPng(bytes); !damage.empty()) return Failed(std::move(damage));
-  if (IsCutOffWebp(bytes)) return Failed("WebP data are cut off");
+  if (IsPng(bytes)) {
+    if (std::string damage = DamageOfPng(bytes); !damage.empty()) return Failed(std::move(damage));
+  }
+  if (IsWebp(bytes) && IsCutOffWebp(bytes)) return Failed("WebP data are cut off");
   cv::Mat image;
   try {
     image = cv::imdecode(bytes,

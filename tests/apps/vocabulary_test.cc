@@ -79,7 +79,7 @@ TEST_F(VocabularyCommand, RefusesInOneLine) {
   EXPECT_THAT(RefusalOf({"convert", image, "--out", out}), HasSubstr("is an image"));
   EXPECT_THAT(RefusalOf({"train", image, "--out", out}), HasSubstr("name at least two"));
   EXPECT_THAT(RefusalOf({"train", image, File("none.png"), "--out", out, "--quiet"}),
-              AllOf(HasSubstr("none.png"), HasSubstr("cannot be read")));
+              AllOf(HasSubstr("none.png"), HasSubstr("cannot be opened; name images")));
   EXPECT_THAT(RefusalOf({"train", Good().string(), "--out", File("no/folder")}),
               HasSubstr("its folder does not exist"));
   EXPECT_THAT(RefusalOf({"train", Good().string(), "--out", out, "--depth", "0"}),
