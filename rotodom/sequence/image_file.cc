@@ -157,8 +157,8 @@ bool IsCutOffWebp(const Bytes& bytes) {
 // ---- any
 
 // Whether the file begins as one of the formats that are read here. OpenCV would offer any other to
-// whatever it was built with: geographic formats that name further files and addresses to read, and
-// medical ones whose reader ends the program where it does not understand a file.
+// whatever it was built with: GDAL's many formats, and a medical one whose reader ends the program
+// at a file that it does not understand.
 bool IsKnownFormat(const Bytes& bytes) {
   // A damaged WebP file goes on to the medical reader when it has its mark.
   if (IsWebp(bytes)) return ClaimedPixelsOfWebp(bytes) > 0 && !Has(bytes, 128, "DICM");
