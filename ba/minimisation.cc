@@ -16,6 +16,7 @@
 #include "ba/loss.h"
 #include "ba/marginal_covariance.h"
 #include "ba/reprojection_cost.h"
+#include "ba/stray_points.h"
 
 namespace rotslam {
 namespace {
@@ -43,7 +44,7 @@ bool SharesCenters(const BundleState& state) {
 // address, and with it the order of elimination, which must not depend on where an allocation
 // lands. Poses are one block each, for which Ceres has its specialised elimination of points; only
 // frames that share a centre need those.
-class CameraBlocks final : public ceres::EvaluationCallback {
+class CameraBlocks {
  public:
   CameraBlocks(const BundleState& state, const Camera& calibrated, bool turns)
       : layout_(!turns                 ? CameraLayout::kCenter
@@ -65,9 +66,8 @@ class CameraBlocks final : public ceres::EvaluationCallback {
     }
   }
 
-  // Before each evaluation: what many observations have in common.
-  void PrepareForEvaluation(bool /*evaluate_jacobians*/, bool new_evaluation_point) override {
-    if (!new_evaluation_point) return;
+  // As the numbers say: what many observations have in common.
+  void Follow() {
     for (std::size_t k = 0; k < rotations_.size() && layout_ != CameraLayout::kCenter; ++k) {
       rotations_[k].Turn(TurnOf(k));
     }
@@ -96,6 +96,16 @@ class CameraBlocks final : public ceres::EvaluationCallback {
     if (layout_ == CameraLayout::kPose) return Turn(frame_of_center_[center]);
     return Center(center);
   }
+  // As of the last evaluation.
+  std::vector<StrayPoints::Pose> Poses(const BundleState& state) {
+    std::vector<StrayPoints::Pose> poses;
+    poses.reserve(state.frames.size());
+    for (std::size_t k = 0; k < state.frames.size(); ++k) {
+      poses.push_back(
+          {rotations_[k].Matrix(), Eigen::Vector3d::Map(Center(state.frames[k].center))});
+    }
+    return poses;
+  }
   double* Lens() { return &numbers_[numbers_.size() - kLensSize]; }
   void FreeLens() { moves_lens_ = true; }
 
@@ -118,6 +128,36 @@ class CameraBlocks final : public ceres::EvaluationCallback {
   Camera camera_;
   const Camera& calibrated_;
   bool moves_lens_ = false;
+};
+
+// What observations have in common, and stray points, follow the solver's numbers.
+class Followers final : public ceres::EvaluationCallback, public ceres::IterationCallback {
+ public:
+  Followers(const BundleState& state, CameraBlocks& cameras, StrayPoints& strays)
+      : state_(state), cameras_(cameras), strays_(strays) {}
+
+  // Before each evaluation. Derivatives are asked for where the solver starts, and of what it has
+  // accepted.
+  void PrepareForEvaluation(bool evaluate_jacobians, bool new_evaluation_point) override {
+    if (!new_evaluation_point) return;
+    cameras_.Follow();
+    if (evaluate_jacobians) {
+      strays_.Start(cameras_.Poses(state_));
+    } else {
+      strays_.Try(cameras_.Poses(state_));
+    }
+  }
+
+  // After each step.
+  ceres::CallbackReturnType operator()(const ceres::IterationSummary& step) override {
+    if (step.iteration > 0 && step.step_is_successful) strays_.Accept();
+    return ceres::SOLVER_CONTINUE;
+  }
+
+ private:
+  const BundleState& state_;
+  CameraBlocks& cameras_;
+  StrayPoints& strays_;
 };
 
 // Ends a minimisation when what is still to come is less than a share of the cost, if each step
@@ -159,7 +199,9 @@ class Minimisation {
         huber_bend_(round.loss == "huber" ? round.loss_scale : 0.0),
         loss_(huber_bend_ > 0.0 ? nullptr : MakeLoss(round)),
         cameras_(state, calibrated, refine_rotations_),
-        problem_(ProblemOptions(cameras_)),
+        strays_(state, options.min_angle_deg * kRadFromDeg, options.num_threads),
+        followers_(state, cameras_, strays_),
+        problem_(ProblemOptions(followers_)),
         frame_used_(state.frames.size(), false),
         center_used_(state.centers.size(), false) {
     ordering_ = std::make_shared<ceres::ParameterBlockOrdering>();
@@ -188,11 +230,15 @@ class Minimisation {
     options.initial_trust_region_radius = round.initial_radius;
     options.max_trust_region_radius = kMaxTrustRegionRadius;
     options.logging_type = ceres::SILENT;
+    options.callbacks.push_back(&followers_);
     Arrival arrival(round.function_tolerance);
     options.callbacks.push_back(&arrival);
     ceres::Solver::Summary summary;
     ceres::Solve(options, &problem_, &summary);
     TakeCameras();
+    for (std::size_t k = 0; k < state_.tracks.size(); ++k) {
+      state_.tracks[k].position += strays_.AcceptedShift(k);
+    }
     TakeLens(bundle_options.lens);
     return summary;
   }
@@ -232,9 +278,9 @@ class Minimisation {
   }
 
  private:
-  static ceres::Problem::Options ProblemOptions(CameraBlocks& cameras) {
+  static ceres::Problem::Options ProblemOptions(Followers& followers) {
     ceres::Problem::Options options;
-    options.evaluation_callback = &cameras;
+    options.evaluation_callback = &followers;
     options.cost_function_ownership = ceres::DO_NOT_TAKE_OWNERSHIP;
     options.loss_function_ownership = ceres::DO_NOT_TAKE_OWNERSHIP;
     options.manifold_ownership = ceres::DO_NOT_TAKE_OWNERSHIP;
@@ -268,12 +314,13 @@ class Minimisation {
   }
 
   void AddResiduals() {
-    for (TrackState& track : state_.tracks) {
+    for (std::size_t k = 0; k < state_.tracks.size(); ++k) {
+      TrackState& track = state_.tracks[k];
       // With rotations held a direction has nothing to say.
       if (track.kind == TrackKind::kOut) continue;
       if (track.kind == TrackKind::kDirection && !refine_rotations_) continue;
       for (const Sight& sight : track.sights) {
-        if (sight.used) AddObservation(track, sight);
+        if (sight.used) AddObservation(track, strays_.Shift(k), sight);
       }
       ordering_->AddElementToGroup(track.position.data(), 0);
       (track.kind == TrackKind::kPoint ? counts_.num_points : counts_.num_directions) += 1;
@@ -289,7 +336,7 @@ class Minimisation {
     }
   }
 
-  void AddObservation(TrackState& track, const Sight& sight) {
+  void AddObservation(TrackState& track, const Eigen::Vector3d& shift, const Sight& sight) {
     const FrameState& frame = state_.frames[sight.frame];
     const Observation& observation = *sight.observation;
     ObservationForm form;
@@ -299,6 +346,7 @@ class Minimisation {
     costs_.emplace_back(cameras_.camera(),
                         calibrated_,
                         cameras_.RotationOf(sight.frame),
+                        shift,
                         observation.keypoint_px,
                         observation.sigma_px,
                         huber_bend_,
@@ -427,6 +475,8 @@ class Minimisation {
   std::unique_ptr<LensPriorCost> lens_prior_;
   std::unique_ptr<ScaleAnchorCost> anchor_;
   CameraBlocks cameras_;
+  StrayPoints strays_;
+  Followers followers_;
   ceres::Problem problem_;
   std::vector<bool> frame_used_;
   std::vector<bool> center_used_;

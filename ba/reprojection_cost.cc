@@ -109,6 +109,7 @@ void TurnedRotation::Turn(const Eigen::Vector3d& turn) {
 ReprojectionCost::ReprojectionCost(const Camera& camera,
                                    const Camera& calibrated,
                                    const TurnedRotation& rotation,
+                                   const Eigen::Vector3d& shift,
                                    const Eigen::Vector2d& keypoint_px,
                                    double sigma_px,
                                    double huber_bend,
@@ -116,6 +117,7 @@ ReprojectionCost::ReprojectionCost(const Camera& camera,
     : camera_(camera),
       calibrated_(calibrated),
       rotation_(rotation),
+      shift_(shift),
       keypoint_px_(keypoint_px),
       sigma_px_(sigma_px),
       huber_bend_(huber_bend),
@@ -138,7 +140,7 @@ bool ReprojectionCost::Evaluate(double const* const* parameters,
                                 double** jacobians) const {
   const Blocks blocks = BlocksOf(form_, parameters, jacobians);
   const Eigen::Map<const Eigen::Vector3d> center(blocks.center);
-  const Eigen::Map<const Eigen::Vector3d> point(blocks.point);
+  const Eigen::Vector3d point = Eigen::Vector3d::Map(blocks.point) + shift_;
   ReprojectionJacobian J;
   const std::optional<Eigen::Vector2d> pixel =
       Reproject(camera_, rotation_.Matrix(), center, point, blocks.WantJacobians() ? &J : nullptr);

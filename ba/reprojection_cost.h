@@ -79,7 +79,7 @@ struct ObservationForm {
   bool moves_lens = false;
 };
 
-/// (Project(R_c_w (point - center)) - keypoint_px) / sigma_px, under Huber's loss: see
+/// (Project(R_c_w (point + shift - center)) - keypoint_px) / sigma_px, under Huber's loss: see
 /// UnderHuberLoss. Its derivatives are what steps are taken with, exact up to the loss' bend.
 class ReprojectionCost final : public ceres::CostFunction {
  public:
@@ -87,11 +87,13 @@ class ReprojectionCost final : public ceres::CostFunction {
   /// @param rotation    turned as the parameters say: the caller keeps both so (see
   ///                    ceres::EvaluationCallback).
   /// @param calibrated  what LensParameters refer to.
+  /// @param shift       of the point, which the caller may change between evaluations.
   /// @param huber_bend  of Huber's loss, in sigmas; 0: no loss.
-  /// The first three must outlive the cost function.
+  /// The first four must outlive the cost function.
   ReprojectionCost(const Camera& camera,
                    const Camera& calibrated,
                    const TurnedRotation& rotation,
+                   const Eigen::Vector3d& shift,
                    const Eigen::Vector2d& keypoint_px,
                    double sigma_px,
                    double huber_bend = 0.0,
@@ -104,6 +106,7 @@ class ReprojectionCost final : public ceres::CostFunction {
   const Camera& camera_;
   const Camera& calibrated_;
   const TurnedRotation& rotation_;
+  const Eigen::Vector3d& shift_;
   Eigen::Vector2d keypoint_px_;
   double sigma_px_;
   double huber_bend_;

@@ -35,6 +35,7 @@ class StreetProblem {
         costs_.emplace_back(scene_.camera,
                             scene_.camera,
                             rotations_[observation.frame.value],
+                            no_shift_,
                             observation.keypoint_px,
                             observation.sigma_px);
         problem_.AddResidualBlock(
@@ -57,6 +58,7 @@ class StreetProblem {
 
   BaScene scene_;
   ceres::HuberLoss loss_{1.0};
+  const Eigen::Vector3d no_shift_ = Eigen::Vector3d::Zero();
   std::deque<ReprojectionCost> costs_;
   std::vector<TurnedRotation> rotations_;
   std::vector<Eigen::Matrix<double, 6, 1>> poses_;

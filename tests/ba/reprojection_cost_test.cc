@@ -81,6 +81,8 @@ void ExpectJacobiansAgree(const ceres::CostFunction& cost, std::vector<std::vect
 
 const Rotation kStart = Rotation::Exp({0.3, -0.2, 0.1});
 const Eigen::Vector2d kKeypoint_px(600.0, 200.0);
+// Added to the point: nothing.
+const Eigen::Vector3d kShift = Eigen::Vector3d::Zero();
 constexpr double kSigma_px = 0.7;
 
 // A reprojection cost that keeps rotation and lens as its parameters say.
@@ -91,7 +93,7 @@ class FollowingCost final : public ceres::CostFunction {
         camera_(calibrated),
         rotation_(kStart),
         form_(form),
-        cost_(camera_, calibrated_, rotation_, kKeypoint_px, kSigma_px, 0.0, form) {
+        cost_(camera_, calibrated_, rotation_, kShift, kKeypoint_px, kSigma_px, 0.0, form) {
     set_num_residuals(cost_.num_residuals());
     *mutable_parameter_block_sizes() = cost_.parameter_block_sizes();
   }
@@ -272,7 +274,7 @@ TEST(ReprojectionCost, PointBehindTheCameraCostsButDoesNotPull) {
   const Camera camera = BaCamera();
   const TurnedRotation rotation{Rotation()};
   const ReprojectionCost cost(
-      camera, camera, rotation, {600.0, 200.0}, 2.0, 0.0, {.camera = CameraLayout::kApart});
+      camera, camera, rotation, kShift, {600.0, 200.0}, 2.0, 0.0, {.camera = CameraLayout::kApart});
   const double turn[3] = {0.0, 0.0, 0.0};
   const double center[3] = {0.0, 0.0, 0.0};
   const double point[3] = {0.1, 0.2, -3.0};
