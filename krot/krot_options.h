@@ -34,8 +34,10 @@ struct KrotOptions {
   // the sequence (docs/performance.md).
   int max_bracket_views = 1000;
   // Views that go into the start's programs together. Components with more are solved in blocks of
-  // so many, which overlap by a quarter and are joined by what they share (JoinBlocks).
-  int max_lp_views = 1000;
+  // so many, which overlap by a quarter and are joined by what they share (JoinBlocks). Larger ones
+  // take more iterations a view, ten times the time at 1,000, and bundle adjustment ends at the
+  // same cost from either.
+  int max_lp_views = 150;
   // Observations per view in the start's programs.
   int observations_per_view = 40;
   // Tracks under this parallax come into the linear programs last, for the sake of conditioning.
