@@ -46,6 +46,7 @@ Explanation ExplanationBy(const std::vector<BundleSummary>& bundles) {
   for (const BundleSummary& bundle : bundles) {
     const BundleSupport& support = bundle.support;
     sum.num_observations += support.num_observations;
+    sum.num_tracks += support.num_points;
     sum.redundancy +=
         2 * support.num_observations - 3 * support.num_points - 6 * support.num_frames;
     sum.cost += support.cost;
@@ -56,12 +57,18 @@ Explanation ExplanationBy(const std::vector<BundleSummary>& bundles) {
 Explanation ExplanationBy(const TurningResult& turning) {
   const int num_free =
       2 * turning.num_directions + 3 * static_cast<int>(turning.cam_from_world.size());
-  return {turning.num_observations, 2 * turning.num_observations - num_free, turning.final_cost};
+  return {.num_observations = turning.num_observations,
+          .num_tracks = turning.num_directions,
+          .redundancy = 2 * turning.num_observations - num_free,
+          .cost = turning.final_cost};
 }
 
 double Evidence(const Explanation& explanation, double limit) {
   if (explanation.redundancy <= 0) return 0.0;
-  if (limit == 0.0) return explanation.redundancy;
+  if (limit == 0.0) {
+    const int num_matches = explanation.num_observations - explanation.num_tracks;
+    return std::max(0, explanation.redundancy - num_matches);
+  }
   const double variance = std::max(kLeastVariance, 2.0 * explanation.cost / explanation.redundancy);
   return explanation.redundancy * std::max(0.0, 0.5 * std::log(limit * limit / variance));
 }

@@ -13,6 +13,7 @@ int NumObservations(const std::vector<Track>& tracks);
 /// What speaks for a model of a sequence.
 struct Explanation {
   int num_observations = 0;  // that it explains
+  int num_tracks = 0;        // that these belong to
   // Measurements that it has passed as checks: two for each observation that it explains, less the
   // numbers it was free to choose, three for a rotation or position and two (a direction) or three
   // (a point) for each track.
@@ -25,7 +26,9 @@ Explanation ExplanationBy(const TurningResult& turning);
 
 /// In nats: each check tells how many times smaller residuals are than the limit (in sigmas) within
 /// which they count. Of models that pass as many checks the one with smaller residuals has more of
-/// it. 0 where nothing is checked; without a limit (0) all checks count alike.
+/// it. 0 where nothing is checked.
+/// Without a limit (0) all checks count alike but those that were passed before: from one frame to
+/// the next a track went on by a match that the epipolar geometry of the two had let through.
 /// Source:  Moisan and Stival, A probabilistic criterion to detect rigid point matches, IJCV 2004,
 /// for weighing inliers against their precision.
 double Evidence(const Explanation& explanation, double limit);

@@ -25,6 +25,17 @@ Camera WithFocal(Camera camera, double factor) {
   return camera;
 }
 
+// A point seen in two frames tells nothing that the pair's epipolar geometry has not; a direction
+// does, and so does each further frame that sees the point.
+TEST(Evidence, CountsNoCheckThatMatchesHadPassedBefore) {
+  const double no_limit = 0.0;
+  EXPECT_EQ(Evidence({.num_observations = 200, .num_tracks = 100, .redundancy = 100}, no_limit), 0);
+  EXPECT_EQ(Evidence({.num_observations = 200, .num_tracks = 100, .redundancy = 200}, no_limit),
+            100);
+  EXPECT_EQ(Evidence({.num_observations = 300, .num_tracks = 100, .redundancy = 300}, no_limit),
+            100);
+}
+
 TEST(FindTurning, BelievesInATurnThatAnotherLensExplains) {
   const BaScene scene = MakeScene(true);
   const BundleProblem start = PerturbedProblem(scene, 0.3, 0.0);
