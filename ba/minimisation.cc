@@ -237,7 +237,7 @@ class Minimisation {
     ceres::Solve(options, &problem_, &summary);
     TakeCameras();
     for (std::size_t k = 0; k < state_.tracks.size(); ++k) {
-      state_.tracks[k].position += strays_.AcceptedShift(k);
+      state_.tracks[k].position += strays_.AcceptedShift(k).shift;
     }
     TakeLens(bundle_options.lens);
     return summary;
@@ -336,7 +336,7 @@ class Minimisation {
     }
   }
 
-  void AddObservation(TrackState& track, const Eigen::Vector3d& shift, const Sight& sight) {
+  void AddObservation(TrackState& track, const PointShift& shift, const Sight& sight) {
     const FrameState& frame = state_.frames[sight.frame];
     const Observation& observation = *sight.observation;
     ObservationForm form;

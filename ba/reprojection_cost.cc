@@ -109,7 +109,7 @@ void TurnedRotation::Turn(const Eigen::Vector3d& turn) {
 ReprojectionCost::ReprojectionCost(const Camera& camera,
                                    const Camera& calibrated,
                                    const TurnedRotation& rotation,
-                                   const Eigen::Vector3d& shift,
+                                   const PointShift& shift,
                                    const Eigen::Vector2d& keypoint_px,
                                    double sigma_px,
                                    double huber_bend,
@@ -140,10 +140,13 @@ bool ReprojectionCost::Evaluate(double const* const* parameters,
                                 double** jacobians) const {
   const Blocks blocks = BlocksOf(form_, parameters, jacobians);
   const Eigen::Map<const Eigen::Vector3d> center(blocks.center);
-  const Eigen::Vector3d point = Eigen::Vector3d::Map(blocks.point) + shift_;
+  const Eigen::Vector3d point = Eigen::Vector3d::Map(blocks.point) + shift_.shift;
   ReprojectionJacobian J;
-  const std::optional<Eigen::Vector2d> pixel =
-      Reproject(camera_, rotation_.Matrix(), center, point, blocks.WantJacobians() ? &J : nullptr);
+  std::optional<Eigen::Vector2d> pixel;
+  if (!shift_.lost) {
+    pixel = Reproject(
+        camera_, rotation_.Matrix(), center, point, blocks.WantJacobians() ? &J : nullptr);
+  }
   if (!pixel) {
     J.by_rotation.setZero();
     J.by_center.setZero();

@@ -79,6 +79,12 @@ struct ObservationForm {
   bool moves_lens = false;
 };
 
+/// What a caller adds to a point between evaluations.
+struct PointShift {
+  Eigen::Vector3d shift = Eigen::Vector3d::Zero();
+  bool lost = false;  // not to be seen from anywhere
+};
+
 /// (Project(R_c_w (point + shift - center)) - keypoint_px) / sigma_px, under Huber's loss: see
 /// UnderHuberLoss. Its derivatives are what steps are taken with, exact up to the loss' bend.
 class ReprojectionCost final : public ceres::CostFunction {
@@ -87,13 +93,13 @@ class ReprojectionCost final : public ceres::CostFunction {
   /// @param rotation    turned as the parameters say: the caller keeps both so (see
   ///                    ceres::EvaluationCallback).
   /// @param calibrated  what LensParameters refer to.
-  /// @param shift       of the point, which the caller may change between evaluations.
+  /// @param shift       of the point.
   /// @param huber_bend  of Huber's loss, in sigmas; 0: no loss.
   /// The first four must outlive the cost function.
   ReprojectionCost(const Camera& camera,
                    const Camera& calibrated,
                    const TurnedRotation& rotation,
-                   const Eigen::Vector3d& shift,
+                   const PointShift& shift,
                    const Eigen::Vector2d& keypoint_px,
                    double sigma_px,
                    double huber_bend = 0.0,
@@ -106,7 +112,7 @@ class ReprojectionCost final : public ceres::CostFunction {
   const Camera& camera_;
   const Camera& calibrated_;
   const TurnedRotation& rotation_;
-  const Eigen::Vector3d& shift_;
+  const PointShift& shift_;
   Eigen::Vector2d keypoint_px_;
   double sigma_px_;
   double huber_bend_;

@@ -6,6 +6,7 @@
 #include <Eigen/Core>
 
 #include "ba/bundle_state.h"
+#include "ba/reprojection_cost.h"
 #include "rotodom/types/triangulation.h"
 
 namespace rotslam {
@@ -15,8 +16,9 @@ namespace rotslam {
 /// refused for what these few cost; short steps that spare them hardly get on. Here such points are
 /// put where the cameras' new poses see them, before the step is judged.
 ///
-/// What is added to a point of the solver's is its shift. It goes with the solver's numbers: those
-/// of a refused step are forgotten.
+/// What is added to a point of the solver's is its shift; a point that no place is found for is
+/// lost until it is seen again. Both go with the solver's numbers: those of a refused step are
+/// forgotten.
 class StrayPoints {
  public:
   /// Where a frame's camera stands in an evaluation.
@@ -39,12 +41,13 @@ class StrayPoints {
   void Accept();
 
   /// Of a track; stays where it is in memory.
-  const Eigen::Vector3d& Shift(std::size_t track) const { return shifts_[track]; }
+  const PointShift& Shift(std::size_t track) const { return shifts_[track]; }
   /// Of a track, as last accepted.
-  const Eigen::Vector3d& AcceptedShift(std::size_t track) const { return accepted_shifts_[track]; }
+  const PointShift& AcceptedShift(std::size_t track) const { return accepted_shifts_[track]; }
 
  private:
   double ErrorPx(const TrackState& track, const Eigen::Vector3d& position) const;
+  bool CheaperSeen(std::size_t track) const;
   void Follow(std::size_t track);
   void Offer(std::size_t track, const Eigen::Vector3d& position);
   Eigen::Vector3d CarriedAlong(std::size_t track) const;
@@ -54,9 +57,9 @@ class StrayPoints {
   const BundleState& state_;
   double min_angle_rad_;
   int num_threads_;
-  // By track; errors summed over its observations.
-  std::vector<Eigen::Vector3d> shifts_;
-  std::vector<Eigen::Vector3d> accepted_shifts_;
+  // By track; errors summed over its observations. Those of lost ones are as last seen.
+  std::vector<PointShift> shifts_;
+  std::vector<PointShift> accepted_shifts_;
   std::vector<Eigen::Vector3d> positions_;
   std::vector<Eigen::Vector3d> accepted_positions_;
   std::vector<double> errors_px_;

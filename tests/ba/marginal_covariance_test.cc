@@ -58,7 +58,7 @@ class StreetProblem {
 
   BaScene scene_;
   ceres::HuberLoss loss_{1.0};
-  const Eigen::Vector3d no_shift_ = Eigen::Vector3d::Zero();
+  const PointShift no_shift_;
   std::deque<ReprojectionCost> costs_;
   std::vector<TurnedRotation> rotations_;
   std::vector<Eigen::Matrix<double, 6, 1>> poses_;

@@ -82,7 +82,7 @@ void ExpectJacobiansAgree(const ceres::CostFunction& cost, std::vector<std::vect
 const Rotation kStart = Rotation::Exp({0.3, -0.2, 0.1});
 const Eigen::Vector2d kKeypoint_px(600.0, 200.0);
 // Added to the point: nothing.
-const Eigen::Vector3d kShift = Eigen::Vector3d::Zero();
+const PointShift kShift;
 constexpr double kSigma_px = 0.7;
 
 // A reprojection cost that keeps rotation and lens as its parameters say.
@@ -270,21 +270,30 @@ TEST(TurnedRotation, IsComposedOnTheLeft) {
   EXPECT_EQ(rotation.Matrix(), rotation.At(turn).Matrix());
 }
 
-TEST(ReprojectionCost, PointBehindTheCameraCostsButDoesNotPull) {
+TEST(ReprojectionCost, PointBehindTheCameraOrLostCostsButDoesNotPull) {
   const Camera camera = BaCamera();
   const TurnedRotation rotation{Rotation()};
-  const ReprojectionCost cost(
-      camera, camera, rotation, kShift, {600.0, 200.0}, 2.0, 0.0, {.camera = CameraLayout::kApart});
-  const double turn[3] = {0.0, 0.0, 0.0};
-  const double center[3] = {0.0, 0.0, 0.0};
-  const double point[3] = {0.1, 0.2, -3.0};
-  const double* parameters[3] = {turn, center, point};
-  double residuals[2];
-  double J_point[6];
-  double* jacobians[3] = {nullptr, nullptr, J_point};
-  ASSERT_TRUE(cost.Evaluate(parameters, residuals, jacobians));
-  EXPECT_EQ(residuals[0], kUnseenResidual_px / 2.0);
-  for (const double value : J_point) EXPECT_EQ(value, 0.0);
+  for (const bool lost : {false, true}) {
+    const PointShift shift = {Eigen::Vector3d::Zero(), lost};
+    const ReprojectionCost cost(camera,
+                                camera,
+                                rotation,
+                                shift,
+                                {600.0, 200.0},
+                                2.0,
+                                0.0,
+                                {.camera = CameraLayout::kApart});
+    const double turn[3] = {0.0, 0.0, 0.0};
+    const double center[3] = {0.0, 0.0, 0.0};
+    const double point[3] = {0.1, 0.2, lost ? 3.0 : -3.0};
+    const double* parameters[3] = {turn, center, point};
+    double residuals[2];
+    double J_point[6];
+    double* jacobians[3] = {nullptr, nullptr, J_point};
+    ASSERT_TRUE(cost.Evaluate(parameters, residuals, jacobians));
+    EXPECT_EQ(residuals[0], kUnseenResidual_px / 2.0);
+    for (const double value : J_point) EXPECT_EQ(value, 0.0);
+  }
 }
 
 }  // namespace

@@ -52,11 +52,11 @@ TEST_F(StrayPointsTest, PutsAPointThrownBehindTheCamerasWhereTheySeeIt) {
   for (TrackState& track : state_.tracks) track.position += moved;
   state_.tracks[stray_].position = behind_;
   strays.Try(Poses(moved));
-  const Eigen::Vector3d error = behind_ + strays.Shift(stray_) - (start_ + moved);
+  const Eigen::Vector3d error = behind_ + strays.Shift(stray_).shift - (start_ + moved);
   EXPECT_LT(error.norm(), 0.05 * start_.norm());
   for (std::size_t k = 0; k < state_.tracks.size(); ++k) {
     if (k == stray_) continue;
-    EXPECT_EQ(strays.Shift(k), Eigen::Vector3d::Zero()) << k;
+    EXPECT_EQ(strays.Shift(k).shift, Eigen::Vector3d::Zero()) << k;
   }
 }
 
@@ -65,11 +65,11 @@ TEST_F(StrayPointsTest, ForgetsARefusedStep) {
   strays.Start(Poses());
   state_.tracks[stray_].position = behind_;
   strays.Try(Poses());
-  EXPECT_NE(strays.Shift(stray_), Eigen::Vector3d::Zero());
-  EXPECT_EQ(strays.AcceptedShift(stray_), Eigen::Vector3d::Zero());
+  EXPECT_NE(strays.Shift(stray_).shift, Eigen::Vector3d::Zero());
+  EXPECT_EQ(strays.AcceptedShift(stray_).shift, Eigen::Vector3d::Zero());
   state_.tracks[stray_].position = start_;
   strays.Try(Poses());
-  EXPECT_EQ(strays.Shift(stray_), Eigen::Vector3d::Zero());
+  EXPECT_EQ(strays.Shift(stray_).shift, Eigen::Vector3d::Zero());
 }
 
 TEST_F(StrayPointsTest, KeepsWhatAnAcceptedStepHasShifted) {
@@ -78,11 +78,30 @@ TEST_F(StrayPointsTest, KeepsWhatAnAcceptedStepHasShifted) {
   state_.tracks[stray_].position = behind_;
   strays.Try(Poses());
   strays.Accept();
-  const Eigen::Vector3d shift = strays.AcceptedShift(stray_);
-  EXPECT_EQ(shift, strays.Shift(stray_));
+  const Eigen::Vector3d shift = strays.AcceptedShift(stray_).shift;
+  EXPECT_EQ(shift, strays.Shift(stray_).shift);
   state_.tracks[stray_].position += Eigen::Vector3d(1e-3, 0.0, 0.0);
   strays.Try(Poses());
-  EXPECT_EQ(strays.Shift(stray_), shift);
+  EXPECT_EQ(strays.Shift(stray_).shift, shift);
+}
+
+TEST_F(StrayPointsTest, LosesAPointThatHasNoPlaceAndFindsItAgain) {
+  StrayPoints strays(state_, 0.0, 1);
+  strays.Start(Poses());
+  // Every other camera looks aside, so that no place is right for all.
+  std::vector<StrayPoints::Pose> poses = Poses();
+  for (std::size_t k = 0; k < poses.size(); k += 2) {
+    poses[k].R_c_w = Rotation::Exp({0.0, 1.0, 0.0}).Matrix() * poses[k].R_c_w;
+  }
+  state_.tracks[stray_].position = behind_;
+  strays.Try(poses);
+  EXPECT_TRUE(strays.Shift(stray_).lost);
+  EXPECT_FALSE(strays.AcceptedShift(stray_).lost);
+  strays.Accept();
+  EXPECT_TRUE(strays.AcceptedShift(stray_).lost);
+  strays.Try(Poses());
+  EXPECT_FALSE(strays.Shift(stray_).lost);
+  EXPECT_LT((behind_ + strays.Shift(stray_).shift - start_).norm(), 0.05 * start_.norm());
 }
 
 // Observations that never fitted are no reason to move a point.
@@ -91,7 +110,7 @@ TEST_F(StrayPointsTest, LeavesAPointThatIsSeenAsBadlyAsBefore) {
   StrayPoints strays(state_, 0.0, 1);
   strays.Start(Poses());
   strays.Try(Poses());
-  EXPECT_EQ(strays.Shift(stray_), Eigen::Vector3d::Zero());
+  EXPECT_EQ(strays.Shift(stray_).shift, Eigen::Vector3d::Zero());
 }
 
 }  // namespace
