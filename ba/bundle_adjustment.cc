@@ -131,20 +131,31 @@ class Rounds {
     }
   }
 
-  // Lets the lens move on the observations of the round before; keeps that when it gains enough.
+  // Lets the lens move on the observations of the round before; keeps that when it gains enough
+  // over the same round without.
   void TryLens(const BundleRound& round, BundleState& state) {
     const LensOptions& lens = options_.lens;
     if (!good_ || !round.enabled) return;
     if (!lens.refine_focal && !lens.refine_principal_point && !lens.refine_distortion) return;
-    const BundleState before = state;
-    refine_lens_ = true;
-    Minimise("lens", round, std::chrono::steady_clock::now(), state);
+    BundleState without = state;
+    const auto minimised = [&](bool refine_lens, BundleState& from) {
+      refine_lens_ = refine_lens;
+      Minimise("lens", round, std::chrono::steady_clock::now(), from);
+      return result_.summary.rounds.back();
+    };
+    const BundleRoundSummary with = minimised(true, state);
     if (!good_) return;
-    const BundleRoundSummary& summary = result_.summary.rounds.back();
-    result_.summary.lens_gain = 1.0 - summary.final_cost / summary.initial_cost;
-    refine_lens_ = result_.summary.lens_gain >= lens.min_gain;
+    const auto gain_over = [&](double cost) {
+      return with.final_cost < cost ? 1.0 - with.final_cost / cost : 0.0;
+    };
+    double gain = gain_over(with.initial_cost);
+    // What the round before had left to be gained is not the lens'.
+    if (gain >= lens.min_gain) gain = gain_over(minimised(false, without).final_cost);
+    if (!good_) return;
+    refine_lens_ = gain >= lens.min_gain;
+    result_.summary.lens_gain = gain;
     result_.summary.lens_refined = refine_lens_;
-    if (!refine_lens_) state = before;
+    if (!refine_lens_) state = std::move(without);
   }
 
   // Of what the state holds now.

@@ -46,8 +46,9 @@ TEST(RefineBundle, FindsTheTruthOnACleanStreet) {
   EXPECT_LT(MaxRotationErrorDeg(result.reconstruction, scene.truth), 1e-5);
   EXPECT_LT(result.summary.after.rms_px, 1e-4);
   EXPECT_GT(result.summary.before.rms_px, 1.0);
-  // With the lens that was not needed, and widths fitted to residuals that are none.
-  EXPECT_EQ(result.summary.rounds.size(), 5U);
+  EXPECT_FALSE(result.summary.lens_refined);
+  // With and without the lens that was not needed, and widths fitted to residuals that are none.
+  EXPECT_EQ(result.summary.rounds.size(), 6U);
   EXPECT_TRUE(result.weak_frames.empty());
   EXPECT_GT(result.summary.num_points, 380);  // all but the shallow ones
 }
@@ -368,6 +369,18 @@ TEST(RefineBundle, LeavesAGoodCalibrationToTheLastBit) {
     ASSERT_TRUE(result.Usable());
     EXPECT_FALSE(result.summary.lens_refined) << result.summary.lens_gain;
     EXPECT_EQ(result.camera, scene.camera);
+  }
+}
+
+TEST(RefineBundle, GivesTheLensNoCreditForWhatTheCoarseRoundLeft) {
+  const BaScene scene = MakeBaScene({.num_frames = 40, .num_points = 1500, .noise_px = 0.5});
+  BundleOptions options;
+  options.bridge.enabled = false;
+  for (const int iterations : {1, 2, 3}) {
+    options.coarse.max_iterations = iterations;
+    const BundleResult result = RefineBundle(PerturbedProblem(scene, 0.1, 0.5), options);
+    ASSERT_TRUE(result.Usable());
+    EXPECT_FALSE(result.summary.lens_refined) << iterations << " " << result.summary.lens_gain;
   }
 }
 
