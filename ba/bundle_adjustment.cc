@@ -131,12 +131,15 @@ class Rounds {
     }
   }
 
-  // Lets the lens move on the observations of the round before; keeps that when it gains enough
-  // over the same round without.
+  // Lets the lens move on the observations of the round before; keeps that when it gains enough,
+  // where that is not clear over the same round without.
   void TryLens(const BundleRound& round, BundleState& state) {
+    // Times the least gain: more than a round leaves to be gained that has come to its end.
+    constexpr double kClear = 10.0;
     const LensOptions& lens = options_.lens;
     if (!good_ || !round.enabled) return;
     if (!lens.refine_focal && !lens.refine_principal_point && !lens.refine_distortion) return;
+    const bool is_at_end = result_.status == BundleStatus::kConverged;
     BundleState without = state;
     const auto minimised = [&](bool refine_lens, BundleState& from) {
       refine_lens_ = refine_lens;
@@ -149,8 +152,10 @@ class Rounds {
       return with.final_cost < cost ? 1.0 - with.final_cost / cost : 0.0;
     };
     double gain = gain_over(with.initial_cost);
-    // What the round before had left to be gained is not the lens'.
-    if (gain >= lens.min_gain) gain = gain_over(minimised(false, without).final_cost);
+    const bool is_clear = is_at_end && gain >= kClear * lens.min_gain;
+    if (gain >= lens.min_gain && !is_clear) {
+      gain = gain_over(minimised(false, without).final_cost);
+    }
     if (!good_) return;
     refine_lens_ = gain >= lens.min_gain;
     result_.summary.lens_gain = gain;
