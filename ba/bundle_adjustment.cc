@@ -106,28 +106,24 @@ class Rounds {
     if (good_ && is_first) result_.summary.before = before;
   }
 
-  // Goes on from `round` with its widths fitted to the residuals, until classification changes next
-  // to nothing.
-  void Close(const BundleRound& round, BundleState& state) {
+  // Classifies and minimises until classification changes next to nothing.
+  // @param placement  where points are looked for the first time; from then on near where they are.
+  void Close(BundleRound round, Placement placement, BundleState& state) {
     // Few observations have changed: a step or two.
     constexpr double kEasier = 10.0;
     if (!good_ || !round.enabled) return;
-    BundleRound close = FittedToResiduals(round, options_, state);
-    const bool is_narrower =
-        close.loss_scale < round.loss_scale || close.max_error_px < round.max_error_px;
-    for (int k = 1; k < options_.max_fine_rounds && good_; ++k) {
+    last_ = round;
+    for (int k = 0; k < options_.max_close_rounds && good_; ++k) {
       const auto start = std::chrono::steady_clock::now();
       const std::vector<bool> before = UsedFlags(state);
-      last_ = close;
-      ClassifyAll(close, Placement::kNearby, options_, state);
+      ClassifyAll(round, k == 0 ? placement : Placement::kNearby, options_, state);
       const std::vector<bool> after = UsedFlags(state);
       std::size_t changed = 0;
       for (std::size_t o = 0; o < after.size(); ++o) changed += before[o] != after[o] ? 1 : 0;
       const auto total = static_cast<double>(std::count(after.begin(), after.end(), true));
-      const bool is_new = k == 1 && is_narrower;
-      if (!is_new && static_cast<double>(changed) <= options_.max_changed_share * total) return;
-      if (k == 2) close.function_tolerance *= kEasier;
-      Minimise("close", close, start, state);
+      if (k > 0 && static_cast<double>(changed) <= options_.max_changed_share * total) return;
+      if (k == 2) round.function_tolerance *= kEasier;
+      Minimise("close", round, start, state);
     }
   }
 
@@ -306,16 +302,17 @@ BundleResult RefineBundle(const BundleProblem& problem, const BundleOptions& opt
   rounds.Run("bridge", options.bridge, preparing);
   rounds.Run("coarse", options.coarse, preparing);
   rounds.TryLens(options.coarse, preparing);
+  rounds.Run("fine", options.fine, preparing);
+  const BundleRound close = FittedToResiduals(options.fine, options, preparing);
   if (part) TakeCameras(*part, state);
-  rounds.Run("fine", options.fine, state);
-  rounds.Close(options.fine, state);
+  rounds.Close(close, part ? Placement::kAnywhere : Placement::kNearby, state);
 
   BundleSummary& summary = result.summary;
   for (const BundleRoundSummary& round : summary.rounds) summary.iterations += round.iterations;
   if (!summary.rounds.empty()) {
     const auto whole = std::find_if(
-        summary.rounds.begin(), summary.rounds.end(), [](const BundleRoundSummary& round) {
-          return round.name == "fine";
+        summary.rounds.begin(), summary.rounds.end(), [&](const BundleRoundSummary& round) {
+          return round.name == (in_part ? "close" : "fine");
         });
     const auto first = whole == summary.rounds.end() ? summary.rounds.begin() : whole;
     summary.initial_cost = first->initial_cost;

@@ -94,26 +94,26 @@ struct BundleOptions {
   // what little there is left to mend, the long waves in which a way bends.
   BundleRound fine = {
       .max_error_px = 2.0, .max_iterations = 50, .initial_radius = 1e8, .function_tolerance = 1e-5};
-  // The rounds before the last one take tracks at random until every frame has so many
-  // observations: enough to say where cameras are, at a third of the time. 0: all. The longest
-  // tracks would do worse: they are those that the lens' errors and the tracker's drift bend most.
+  // The three rounds take tracks at random until every frame has so many observations: enough to
+  // say where cameras are, at a third of the time; what closes takes all. 0: all from the start.
+  // The longest tracks would do worse: they are those that the lens' errors and the tracker's drift
+  // bend most.
   int preparing_observations = 300;
   // Keypoints are often better than their sigma says, and what is far out for them are tracks that
-  // drift. So the fine round is gone on with once its residuals are known: the loss leaves the
-  // quadratic at this many spreads, and observations are kept within that many, where that is less
-  // than the round allows. A spread is the median residual, in sigmas, freed of what points take
-  // off by fitting. On simulated walks and drives errors fall to 0.3 to 0.9 of those with the
+  // drift. So once the fine round's residuals are known all tracks close with it: the loss leaves
+  // the quadratic at this many spreads, and observations are kept within that many, where that is
+  // less than the round allows. A spread is the median residual, in sigmas, freed of what points
+  // take off by fitting. On simulated walks and drives errors fall to 0.3 to 0.9 of those with the
   // round's own widths; where residuals are as wide as sigma_px says nothing changes. A limit alone
   // needs 4 spreads for that, and EuRoC then loses 3 %. The closer the two are, the less is left
   // for an adjustment without a loss: COLMAP's takes 1.4 % off the cost of KITTI 00, with 2 and 6
   // spreads 3.8 %. 0: as the round has it.
   double loss_spreads = 3.0;
   double limit_spreads = 5.0;
-  // This is repeated, with the fine round at most so many times in all, until classification
-  // changes less than this share of the observations: then the result does not depend on where it
-  // started.
-  int max_fine_rounds = 6;
-  double max_changed_share = 2e-4;
+  // This is repeated, so many times at most, until classification changes less than this share of
+  // the observations: then the result does not depend on where it started.
+  int max_close_rounds = 5;
+  double max_changed_share = 5e-4;
   // false holds the rotations in every round: they come out bit by bit as they went in.
   bool refine_rotations = true;
   LensOptions lens;
@@ -151,7 +151,7 @@ struct BundleOptions {
     visit("preparing_observations", preparing_observations);
     visit("loss_spreads", loss_spreads);
     visit("limit_spreads", limit_spreads);
-    visit("max_fine_rounds", max_fine_rounds);
+    visit("max_close_rounds", max_close_rounds);
     visit("max_changed_share", max_changed_share);
     visit("refine_rotations", refine_rotations);
     visit("lens", lens);
