@@ -20,11 +20,11 @@ namespace {
 
 // Stages take and give back arrays of some 20 MB many times over, bundle adjustment in every round.
 // By default the allocator returns each to the system, which then makes every page anew: a tenth of
-// the time of known rotation and bundle adjustment.
+// the time of known rotation and bundle adjustment. Before any thread runs.
 void KeepFreedMemory() {
 #ifdef __GLIBC__
-  mallopt(M_MMAP_THRESHOLD, 256 << 20);
-  mallopt(M_TRIM_THRESHOLD, 512 << 20);
+  mallopt(M_MMAP_THRESHOLD, 256 << 20);  // NOLINT(concurrency-mt-unsafe)
+  mallopt(M_TRIM_THRESHOLD, 512 << 20);  // NOLINT(concurrency-mt-unsafe)
 #endif
 }
 

@@ -113,8 +113,7 @@ EpipolarFit RefineTwice(const PairArrays& arrays,
   constexpr double kTolerance = 1e-9;
   const double threshold = options.inlier_px / focal_px;
   const double smallest_noise = options.min_noise_px / focal_px;
-  const EpipolarFit wide =
-      RefineEpipolar(arrays, start, loss, options.refine_iterations, kTolerance);
+  EpipolarFit wide = RefineEpipolar(arrays, start, loss, options.refine_iterations, kTolerance);
   const std::vector<double> squared_distances = SquaredDistances(arrays, wide.model);
   const double noise = NoiseOf(squared_distances, threshold, smallest_noise);
   const double tails = TailsOf(squared_distances, threshold, noise);
