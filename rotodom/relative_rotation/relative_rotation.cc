@@ -111,6 +111,8 @@ EpipolarFit RefineTwice(const PairArrays& arrays,
                         double focal_px,
                         const RelativeRotationOptions& options) {
   constexpr double kTolerance = 1e-9;
+  // Of the threshold: what errs by more has not been tracked but matched, and its tails are lost.
+  constexpr double kTrackedNoise = 0.125;
   const double threshold = options.inlier_px / focal_px;
   const double smallest_noise = options.min_noise_px / focal_px;
   EpipolarFit wide = RefineEpipolar(arrays, start, loss, options.refine_iterations, kTolerance);
@@ -118,7 +120,7 @@ EpipolarFit RefineTwice(const PairArrays& arrays,
   const double noise = NoiseOf(squared_distances, threshold, smallest_noise);
   const double tails = TailsOf(squared_distances, threshold, noise);
   const double sigmas = std::max(options.least_loss_sigmas, options.loss_sigmas / (tails * tails));
-  if (sigmas >= options.loss_sigmas) return wide;
+  if (sigmas >= options.loss_sigmas || noise > kTrackedNoise * threshold) return wide;
   return RefineEpipolar(arrays, wide.model, sigmas * noise, options.refine_iterations, kTolerance);
 }
 
