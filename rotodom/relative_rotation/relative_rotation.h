@@ -27,7 +27,7 @@ struct RelativeRotationOptions {
   // sigmas throughout the drift of simulated drives is 1.05 to 1.5 times as large (tails of 2.25);
   // hand-held walks, KITTI 00, the kitchen are the same. Matches with light tails (fr1_rpy: 1.26)
   // keep most of the width, and so does the search, which would not find its way without.
-  double least_loss_sigmas = 1.0;
+  double least_loss_sigmas = 1.6;
   // No match is believed to be better than this, however well the matches agree.
   double min_noise_px = 0.02;
   // Part of a match's error that its neighbours share, so that the scatter does not show it:

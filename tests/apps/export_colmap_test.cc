@@ -134,10 +134,7 @@ void ColmapTest::ExpectColmapAgrees(const fs::path& sequence, const fs::path& im
   const Analysis triangulated = Analyse(Path("triangulated"));
   EXPECT_EQ(triangulated.images, map.frames.size());
   EXPECT_GT(triangulated.points, 0.95 * num_points);
-  // COLMAP keeps matches that bundle adjustment has left out as too far off for how well the others
-  // fit, and these make its mean larger.
-  constexpr double kLeftOutPx = 0.13;
-  EXPECT_LT(triangulated.mean_error_px, ours.mean_error_px + kLeftOutPx);
+  EXPECT_LT(triangulated.mean_error_px, 1.5 * ours.mean_error_px);
 
   fs::create_directories(Path("mapped"));
   Colmap({"mapper",
