@@ -114,15 +114,4 @@ double NoiseOf(const std::vector<double>& squared_distances, double threshold, d
   return std::max(kFromMedian * std::sqrt(low * high), smallest);
 }
 
-double TailsOf(const std::vector<double>& squared_distances, double threshold, double noise) {
-  double sum = 0.0;
-  int count = 0;
-  for (const double squared : squared_distances) {
-    const bool is_below = squared < threshold * threshold;
-    sum += is_below ? squared : 0.0;
-    count += is_below ? 1 : 0;
-  }
-  return count > 0 ? std::sqrt(sum / count) / noise : 1.0;
-}
-
 }  // namespace rotslam

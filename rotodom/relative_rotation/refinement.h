@@ -49,9 +49,4 @@ Eigen::Matrix3d TranslationAxes(const PairArrays& pairs, const Rotation& j_from_
 /// @return  at least `smallest`; `threshold` when no distance is below it.
 double NoiseOf(const std::vector<double>& squared_distances, double threshold, double smallest);
 
-/// How heavy the tails of the distances below `threshold` are: their root mean square over their
-/// noise. About 1 for normal errors, 1.3 to 3 for tracked matches.
-/// @param noise  see NoiseOf.
-double TailsOf(const std::vector<double>& squared_distances, double threshold, double noise);
-
 }  // namespace rotslam

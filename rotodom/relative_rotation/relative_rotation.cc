@@ -104,26 +104,6 @@ bool IsFixed(const Eigen::Matrix3d& information) {
   return eigenvalues[0] > 1e-10 * eigenvalues[2];
 }
 
-// Refines the model, then again with a loss as narrow as the tails of the distances are heavy.
-EpipolarFit RefineTwice(const PairArrays& arrays,
-                        const EpipolarModel& start,
-                        double loss,
-                        double focal_px,
-                        const RelativeRotationOptions& options) {
-  constexpr double kTolerance = 1e-9;
-  // Of the threshold: what errs by more has not been tracked but matched, and its tails are lost.
-  constexpr double kTrackedNoise = 0.125;
-  const double threshold = options.inlier_px / focal_px;
-  const double smallest_noise = options.min_noise_px / focal_px;
-  EpipolarFit wide = RefineEpipolar(arrays, start, loss, options.refine_iterations, kTolerance);
-  const std::vector<double> squared_distances = SquaredDistances(arrays, wide.model);
-  const double noise = NoiseOf(squared_distances, threshold, smallest_noise);
-  const double tails = TailsOf(squared_distances, threshold, noise);
-  const double sigmas = std::max(options.least_loss_sigmas, options.loss_sigmas / (tails * tails));
-  if (sigmas >= options.loss_sigmas || noise > kTrackedNoise * threshold) return wide;
-  return RefineEpipolar(arrays, wide.model, sigmas * noise, options.refine_iterations, kTolerance);
-}
-
 // Refines the model on its members, tests the baseline, and chooses the rotation to believe.
 std::optional<RelativeRotationEstimate> EstimateFrom(
     const PairArrays& all,
@@ -138,7 +118,8 @@ std::optional<RelativeRotationEstimate> EstimateFrom(
 
   const double loss = options.loss_sigmas *
                       NoiseOf(SquaredDistances(arrays, consensus.model), threshold, smallest_noise);
-  const EpipolarFit epipolar = RefineTwice(arrays, consensus.model, loss, focal_px, options);
+  const EpipolarFit epipolar =
+      RefineEpipolar(arrays, consensus.model, loss, options.refine_iterations, 1e-9);
   RelativeRotationEstimate estimate;
   estimate.num_samples = consensus.num_samples;
   estimate.excess = consensus.excess;
@@ -206,9 +187,6 @@ std::optional<RelativeRotationEstimate> EstimateFrom(
 std::optional<std::string> RelativeRotationOptions::Problem() const {
   if (!(inlier_px > 0.0)) return OutOfRange("inlier_px", inlier_px, "positive");
   if (!(loss_sigmas > 0.0)) return OutOfRange("loss_sigmas", loss_sigmas, "positive");
-  if (!(least_loss_sigmas > 0.0)) {
-    return OutOfRange("least_loss_sigmas", least_loss_sigmas, "positive");
-  }
   if (!(min_noise_px > 0.0)) return OutOfRange("min_noise_px", min_noise_px, "positive");
   if (!(shared_error_px >= 0.0)) {
     return OutOfRange("shared_error_px", shared_error_px, "zero or more");

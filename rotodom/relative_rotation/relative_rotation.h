@@ -17,17 +17,9 @@ struct RelativeRotationOptions {
   // A match counts for a hypothesis while its Sampson distance is below this; larger values let
   // wrong matches vote.
   double inlier_px = 1.5;
-  // Scale of the redescending (Geman-McClure) loss in refinements, in standard deviations of the
-  // noise that the matches show.
+  // Scale of the redescending (Geman-McClure) loss in the final refinement, in standard deviations
+  // of the noise that the matches show.
   double loss_sigmas = 3.0;
-  // The last refinement narrows that by the square of the matches' tails (their root mean square
-  // over their noise), but not below this, and not for matches that err by more than an eighth of
-  // inlier_px. What lies in the tails of well-tracked matches is not noise: corners where a near
-  // edge crosses a far one, patches that bend. They err alike, which passes for a turn. With 3
-  // sigmas throughout the drift of simulated drives is 1.05 to 1.5 times as large (tails of 2.25);
-  // hand-held walks, KITTI 00, the kitchen are the same. Matches with light tails (fr1_rpy: 1.26)
-  // keep most of the width, and so does the search, which would not find its way without.
-  double least_loss_sigmas = 1.6;
   // No match is believed to be better than this, however well the matches agree.
   double min_noise_px = 0.02;
   // Part of a match's error that its neighbours share, so that the scatter does not show it:
@@ -63,7 +55,6 @@ struct RelativeRotationOptions {
   void Visit(Visitor&& visit) {
     visit("inlier_px", inlier_px);
     visit("loss_sigmas", loss_sigmas);
-    visit("least_loss_sigmas", least_loss_sigmas);
     visit("min_noise_px", min_noise_px);
     visit("shared_error_px", shared_error_px);
     visit("finest_px", finest_px);

@@ -3,7 +3,6 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
-#include <random>
 #include <span>
 #include <stdexcept>
 #include <string>
@@ -328,39 +327,6 @@ TEST(EstimateRelativeRotation, OneMatchRepeatedFixesNothing) {
   EXPECT_TRUE(!estimate || estimate->covariance.trace() > 1.0);
 }
 
-// Corners where a near edge crosses a far one slide along it, all towards the same side: a third of
-// the matches, by a quarter of a pixel on average. What that turns the camera by is the mean over
-// many pairs of views, from which noise averages out: an error of that kind makes a drift.
-TEST(EstimateRelativeRotation, HardlyTurnsWithMatchesThatSlideAlike) {
-  constexpr int kScenes = 100;
-  constexpr double kMeanSlidePx = 0.25;
-  const auto mean_turn_deg = [](double least_loss_sigmas) {
-    RelativeRotationOptions options;
-    options.least_loss_sigmas = least_loss_sigmas;
-    double sum = 0.0;
-    for (int k = 0; k < kScenes; ++k) {
-      const auto seed = static_cast<std::uint64_t>(700 + k);
-      PairScene scene = MakePairScene({.num_pairs = 1500, .noise_px = 0.05, .seed = seed});
-      std::mt19937_64 random(seed);
-      std::exponential_distribution<double> slide_px(1.0 / kMeanSlidePx);
-      for (std::size_t n = 0; n < scene.pairs.size(); n += 3) {
-        const Eigen::Vector3d& bearing = scene.pairs[n].bearing_j;
-        const Eigen::Vector3d slid =
-            bearing / bearing.z() + Eigen::Vector3d(0.0, slide_px(random) / kPairFocalPx, 0.0);
-        scene.pairs[n].bearing_j = slid.normalized();
-      }
-      const auto estimate =
-          EstimateRelativeRotation(scene.pairs, Rotation(), kPairFocalPx, options, 1);
-      if (!estimate) return 180.0;
-      sum += (estimate->j_from_i * scene.j_from_i.Inverse()).Log().x();
-    }
-    return std::abs(sum) / kScenes * kDegFromRad;
-  };
-  const double narrowed_deg = mean_turn_deg(RelativeRotationOptions().least_loss_sigmas);
-  const double wide_deg = mean_turn_deg(RelativeRotationOptions().loss_sigmas);
-  EXPECT_LT(narrowed_deg, 0.75 * wide_deg);
-}
-
 // A few matches that occur many times must not upset the samples.
 TEST(EstimateRelativeRotation, RepeatedMatchesDoNoHarm) {
   PairScene scene = MakePairScene({.num_pairs = 100, .noise_px = 0.2});
@@ -374,10 +340,6 @@ TEST(EstimateRelativeRotation, RejectsABrokenContract) {
   PairScene scene = MakePairScene({});
   RelativeRotationOptions bad;
   bad.loss_sigmas = -1.0;
-  EXPECT_THROW(EstimateRelativeRotation(scene.pairs, Rotation(), kPairFocalPx, bad, 1),
-               std::invalid_argument);
-  bad = {};
-  bad.least_loss_sigmas = 0.0;
   EXPECT_THROW(EstimateRelativeRotation(scene.pairs, Rotation(), kPairFocalPx, bad, 1),
                std::invalid_argument);
   scene.pairs[3].bearing_i.x() = std::numeric_limits<double>::quiet_NaN();
