@@ -131,6 +131,7 @@ struct Match {
   std::uint32_t keypoint_j = 0;
   Eigen::Vector3d bearing_i;
   Eigen::Vector3d bearing_j;
+  bool is_refuted = false;  // by the track's point, which fits one of the two
 };
 using PairMatches = std::map<std::pair<FrameId, FrameId>, std::vector<Match>>;
 
@@ -139,13 +140,15 @@ PairMatches ListMatches(const RunMap& map) {
   PairMatches matches;
   for (std::size_t t = 0; t < numbers.size(); ++t) {
     const std::vector<Observation>& seen = map.tracks[t].track.observations;
+    const std::vector<bool>& fits = map.tracks[t].fits;
     for (std::size_t a = 0; a < seen.size(); ++a) {
       for (std::size_t b = a + 1; b < seen.size(); ++b) {
         matches[{seen[a].frame, seen[b].frame}].push_back(
             {static_cast<std::uint32_t>(numbers[t][a]),
              static_cast<std::uint32_t>(numbers[t][b]),
              seen[a].bearing,
-             seen[b].bearing});
+             seen[b].bearing,
+             fits[a] != fits[b]});
       }
     }
   }
@@ -243,7 +246,7 @@ void InsertPairs(const Database& database,
     BinaryWriter good;
     int num_good = 0;
     for (const Match& match : matches) {
-      const bool is_good = pose.Error(match) <= max_error;
+      const bool is_good = !match.is_refuted && pose.Error(match) <= max_error;
       num_good += is_good;
       for (const std::uint32_t number : {match.keypoint_i, match.keypoint_j}) {
         all.Put(number);

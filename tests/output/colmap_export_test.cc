@@ -292,6 +292,41 @@ TEST(ColmapDatabase, ItsGeometriesAreThoseOfThePoses) {
   EXPECT_GT(num_verified, 0.6 * num_raw);
 }
 
+TEST(ColmapDatabase, NoGeometryHoldsMatchesThatTheirPointRefutes) {
+  const TemporaryFolder folder;
+  const fs::path file = folder.path() / "database.db";
+  RunMap map = MapOfScene(ExportScene());
+  const auto entry = std::find_if(map.tracks.begin(), map.tracks.end(), [](const MapTrack& track) {
+    return std::count(track.fits.begin(), track.fits.end(), true) > 3;
+  });
+  ASSERT_NE(entry, map.tracks.end());
+  entry->fits.front() = false;
+  const int refuted = static_cast<int>(entry - map.tracks.begin());
+  WriteColmapDatabase(file, map);
+  const auto keypoints = ListKeypoints(map);
+  // Matches of the track, and those of them with its first observation.
+  const auto count = [&](const std::string& table) {
+    std::pair<int, int> counts;
+    for (const Row& row : Query(file, "SELECT pair_id, data FROM " + table)) {
+      const std::int64_t id = std::stoll(row[0]);
+      const auto& list_i = keypoints.at(FrameId{static_cast<int>(id / 2147483647) - 1});
+      const auto& list_j = keypoints.at(FrameId{static_cast<int>(id % 2147483647) - 1});
+      const std::vector<std::uint32_t> matches = Numbers<std::uint32_t>(row[1]);
+      for (std::size_t k = 0; k + 1 < matches.size(); k += 2) {
+        const MapKeypoint& i = list_i.at(matches[k]);
+        const MapKeypoint& j = list_j.at(matches[k + 1]);
+        if (i.track != refuted) continue;
+        ++counts.first;
+        counts.second += i.observation == 0 || j.observation == 0;
+      }
+    }
+    return counts;
+  };
+  const int num_seen = static_cast<int>(entry->fits.size());
+  EXPECT_EQ(count("matches").second, num_seen - 1);
+  EXPECT_EQ(count("two_view_geometries"), std::pair((num_seen - 1) * (num_seen - 2) / 2, 0));
+}
+
 TEST(ColmapDatabase, IsTheSameFileEveryTimeAndReplacesAnOlderOne) {
   const TemporaryFolder folder;
   const RunMap map = MapOfScene(ExportScene());
