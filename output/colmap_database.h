@@ -31,11 +31,11 @@ struct ColmapDatabaseOptions {
 /// one camera, the frames as images with the ids of WriteColmapModel, their sightings as keypoints
 /// in its order, and per pair of frames
 /// - `matches`: all tracks that both show;
-/// - `two_view_geometries`: those of them that agree with the poses and of which the track's point
-///   does not fit just one, and E (of unit translation), F where the camera has no distortion, and
-///   the pose of the second camera from the first. Pairs at one place, and those that the
-///   view-graph saw no baseline in, have configuration 5 (PANORAMIC) and the homography of the turn
-///   at infinity; the others 2 (CALIBRATED).
+/// - `two_view_geometries`: those of them that agree with the poses, unless the track's point fits
+///   one of the two sightings only, and E (of unit translation), F where the camera has no
+///   distortion, and the pose of the second camera from the first. Pairs at one place, and those
+///   that the view-graph saw no baseline in, have configuration 5 (PANORAMIC) and the homography of
+///   the turn at infinity; the others 2 (CALIBRATED).
 /// There are no descriptors: matching is done.
 /// Throws std::invalid_argument when options.Problem(), std::runtime_error when SQLite or the disk
 /// refuse; never leaves half a file.

@@ -125,6 +125,13 @@ std::vector<T> Numbers(const std::string& blob) {
   return numbers;
 }
 
+// The two frames behind a pair's number.
+std::pair<FrameId, FrameId> FramesOf(const std::string& pair_id) {
+  const std::int64_t id = std::stoll(pair_id);
+  return {FrameId{static_cast<int>(id / 2147483647) - 1},
+          FrameId{static_cast<int>(id % 2147483647) - 1}};
+}
+
 struct PairRow {
   int rows = 0;
   int config = 0;
@@ -201,9 +208,9 @@ TEST(ColmapDatabase, ItsMatchesAreTheTracks) {
   EXPECT_EQ(rows.size(), 36u);  // every two of nine frames
   std::size_t num_matches = 0;
   for (const Row& row : rows) {
-    const std::int64_t id = std::stoll(row[0]);
-    const auto& list_i = keypoints.at(FrameId{static_cast<int>(id / 2147483647) - 1});
-    const auto& list_j = keypoints.at(FrameId{static_cast<int>(id % 2147483647) - 1});
+    const auto [frame_i, frame_j] = FramesOf(row[0]);
+    const auto& list_i = keypoints.at(frame_i);
+    const auto& list_j = keypoints.at(frame_j);
     const std::vector<std::uint32_t> matches = Numbers<std::uint32_t>(row[2]);
     ASSERT_EQ(matches.size(), 2 * std::stoul(row[1]));
     for (std::size_t k = 0; k < matches.size(); k += 2) {
@@ -308,9 +315,9 @@ TEST(ColmapDatabase, NoGeometryHoldsMatchesThatTheirPointRefutes) {
   const auto count = [&](const std::string& table) {
     std::pair<int, int> counts;
     for (const Row& row : Query(file, "SELECT pair_id, data FROM " + table)) {
-      const std::int64_t id = std::stoll(row[0]);
-      const auto& list_i = keypoints.at(FrameId{static_cast<int>(id / 2147483647) - 1});
-      const auto& list_j = keypoints.at(FrameId{static_cast<int>(id % 2147483647) - 1});
+      const auto [frame_i, frame_j] = FramesOf(row[0]);
+      const auto& list_i = keypoints.at(frame_i);
+      const auto& list_j = keypoints.at(frame_j);
       const std::vector<std::uint32_t> matches = Numbers<std::uint32_t>(row[1]);
       for (std::size_t k = 0; k + 1 < matches.size(); k += 2) {
         const MapKeypoint& i = list_i.at(matches[k]);
