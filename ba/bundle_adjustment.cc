@@ -79,7 +79,7 @@ std::vector<bool> UsedFlags(const BundleState& state) {
 BundleRound FittedToResiduals(BundleRound round,
                               const BundleOptions& options,
                               const BundleState& state) {
-  const double spread = std::max(kLeastSpread, ResidualSpread(options, state));
+  const double spread = std::max(kLeastSpread, ResidualSpread(state));
   const auto narrow = [&](double spreads, double width) {
     return spreads > 0.0 ? std::min(width, spreads * spread) : width;
   };

@@ -320,30 +320,21 @@ void ClassifyAll(const BundleRound& round,
   RemoveWeakFrames(classifier, options.min_frame_observations, state);
 }
 
-double ResidualSpread(const BundleOptions& options, const BundleState& state) {
+double ResidualSpread(const BundleState& state) {
   std::vector<double> residuals;
-  std::vector<bool> turns(state.frames.size(), false);
-  std::vector<bool> moves(state.centers.size(), false);
-  ForEachUsedSight(state, [&](const TrackState& track, const Sight& sight, double error_px) {
+  ForEachUsedSight(state, [&](const TrackState& /*track*/, const Sight& sight, double error_px) {
     residuals.push_back(error_px / sight.observation->sigma_px);
-    const FrameState& frame = state.frames[sight.frame];
-    if (frame.fixed) return;
-    turns[sight.frame] = options.refine_rotations;
-    if (track.kind == TrackKind::kPoint) moves[frame.center] = true;
   });
   if (residuals.empty()) return 0.0;
-  auto num_free = static_cast<std::size_t>(3 * (std::count(turns.begin(), turns.end(), true) +
-                                                std::count(moves.begin(), moves.end(), true)));
+  std::size_t num_free = 0;
   for (const TrackState& track : state.tracks) {
     if (track.kind != TrackKind::kOut) num_free += track.kind == TrackKind::kPoint ? 3 : 2;
   }
   const auto middle = residuals.begin() + static_cast<std::ptrdiff_t>(residuals.size() / 2);
   std::nth_element(residuals.begin(), middle, residuals.end());
-  // Tracks alone leave a quarter of the measurements or more: two observations to each at least.
-  constexpr double kLeastLeft = 0.25;
-  const double left =
-      1.0 - static_cast<double>(num_free) / static_cast<double>(2 * residuals.size());
-  return *middle / std::sqrt(std::max(kLeastLeft, left));
+  // Two observations or more to a track: a quarter of the measurements or more.
+  const auto measured = static_cast<double>(2 * residuals.size());
+  return *middle * std::sqrt(measured / (measured - static_cast<double>(num_free)));
 }
 
 BundleSupport SupportWithin(const BundleRound& round,

@@ -21,10 +21,9 @@ void ClassifyAll(const BundleRound& round,
                  BundleState& state);
 
 /// How wide the residuals of the used observations are, in sigmas: their median, times what points
-/// and cameras take off residuals by fitting them, the root of two measurements to an observation
-/// over those less three (a point) or two (a direction) to a track, three to a centre, and three to
-/// a rotation where `options` lets it move. 0 where there are none.
-double ResidualSpread(const BundleOptions& options, const BundleState& state);
+/// take off residuals by fitting them, the root of two measurements to an observation over those
+/// less three (a point) or two (a direction) to a track. 0 where there are none.
+double ResidualSpread(const BundleState& state);
 
 /// What the points explain within the round's limit, the cameras standing where they stand.
 BundleSupport SupportWithin(const BundleRound& round,

@@ -57,7 +57,7 @@ TEST(ResidualSpread, IsThatOfTheNoise) {
   // to the noise take a fifth off, which the spread undoes; those here are fitted roughly.
   for (const double noise_px : {0.1, 0.4}) {
     const ClassifiedScene scene({.noise_px = noise_px});
-    EXPECT_NEAR(ResidualSpread(scene.options, scene.state), 1.177 * noise_px, 0.18 * noise_px);
+    EXPECT_NEAR(ResidualSpread(scene.state), 1.177 * noise_px, 0.18 * noise_px);
   }
 }
 
