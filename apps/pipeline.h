@@ -10,6 +10,7 @@
 #include "krot/held_stretches.h"
 #include "krot/known_rotation.h"
 #include "output/cloud_outliers.h"
+#include "rotodom/completion/completion.h"
 #include "rotodom/loop/loop_closure.h"
 #include "rotodom/odometry.h"
 #include "rotodom/sequence/sequence.h"
@@ -26,6 +27,7 @@ struct PipelineOptions {
   KeyframeOptions keyframes;
   KrotOptions krot;
   BundleOptions ba;
+  CompletionOptions completion;
   ResectionOptions resection;
   // Points whose rays meet at less than this stay out of the cloud: their depth is noise.
   double cloud_min_angle_deg = 2.0;
@@ -42,6 +44,7 @@ struct PipelineOptions {
     visit("keyframes", keyframes);
     visit("krot", krot);
     visit("ba", ba);
+    visit("completion", completion);
     visit("resection", resection);
     visit("cloud_min_angle_deg", cloud_min_angle_deg);
     visit("cloud_outliers", cloud_outliers);

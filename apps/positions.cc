@@ -4,11 +4,14 @@
 #include <array>
 #include <cstdio>
 #include <iterator>
+#include <set>
 
+#include "apps/map_views.h"
 #include "apps/placement.h"
 #include "apps/turning.h"
 #include "output/cloud_outliers.h"
 #include "rotodom/averaging/anchors.h"
+#include "rotodom/completion/completion.h"
 
 namespace rotslam {
 namespace {
@@ -192,10 +195,31 @@ std::vector<Track> TracksOf(const Orientations& orientations) {
       orientations.edge_matches, orientations.features, AllFrames(orientations.cam_from_world), 2);
 }
 
+// Completes tracks with the images of `frames`; null where that is not asked for.
+TrackCompletion CompletionWith(const Input& input,
+                               const Orientations& orientations,
+                               const PipelineOptions& options,
+                               int num_threads,
+                               Progress& progress) {
+  if (!options.completion.enabled) return nullptr;
+  return [&, num_threads](const Reconstruction& map, const Camera& camera) {
+    std::set<FrameId> frames;
+    for (const auto& [frame, center] : map.center_in_world) frames.insert(frame);
+    std::string problem;
+    MapViews views = ReadMapViews(input.path, options.sequence, frames, problem);
+    if (!problem.empty())
+      progress.Warn(problem + "; points are not looked for in images that cannot be read again");
+    SetMotions(orientations, map, views);
+    return CompleteTracks(map, views, camera, options.completion, num_threads);
+  };
+}
+
 // FindKeyframePositions from the tracks of all frames.
+// @param complete  may be null.
 PositionResult MapKeyframes(const Orientations& orientations,
                             const std::vector<Track>& all_tracks,
                             const Camera& camera,
+                            const TrackCompletion& complete,
                             const PipelineOptions& options,
                             int num_threads,
                             Progress& progress) {
@@ -261,7 +285,7 @@ PositionResult MapKeyframes(const Orientations& orientations,
 
   progress.StartStage("bundle adjustment", -1);
   RefinedComponents refined = RefineComponents(
-      keyframe_rotations, result.krot, tracks, result.held, camera, bundle_options);
+      keyframe_rotations, result.krot, tracks, result.held, camera, bundle_options, complete);
   result.camera = refined.camera;
   for (std::size_t k = 0; k < refined.components.size(); ++k) {
     MapComponent& component = refined.components[k];
@@ -305,18 +329,25 @@ PositionResult FindKeyframePositions(const Orientations& orientations,
                                      int num_threads,
                                      Progress& progress) {
   progress.StartStage("tracks", -1);
-  return MapKeyframes(orientations, TracksOf(orientations), camera, options, num_threads, progress);
+  return MapKeyframes(
+      orientations, TracksOf(orientations), camera, nullptr, options, num_threads, progress);
 }
 
-PositionResult FindPositions(const Orientations& orientations,
-                             const Camera& camera,
+PositionResult FindPositions(const Input& input,
+                             const Orientations& orientations,
                              const PipelineOptions& options,
                              int num_threads,
                              Progress& progress) {
   progress.StartStage("tracks", -1);
   std::vector<Track> all_tracks = TracksOf(orientations);
   PositionResult result =
-      MapKeyframes(orientations, all_tracks, camera, options, num_threads, progress);
+      MapKeyframes(orientations,
+                   all_tracks,
+                   input.camera,
+                   CompletionWith(input, orientations, options, num_threads, progress),
+                   options,
+                   num_threads,
+                   progress);
   if (result.components.empty()) return result;
 
   progress.StartStage("frames between keyframes", -1);

@@ -5,6 +5,7 @@
 #include <string>
 #include <vector>
 
+#include "apps/input.h"
 #include "apps/orientations.h"
 #include "apps/pipeline.h"
 #include "apps/refinement.h"
@@ -34,18 +35,18 @@ struct PositionResult {
 };
 
 /// From orientations to positions and points: keyframes and tracks, the known-rotation problem,
-/// bundle adjustment, then the frames between keyframes.
+/// bundle adjustment with the keyframes' images, then the frames between keyframes.
 ///
 /// Parts of the map that no track with depth links keep their own scale (`components`). They are
 /// put together by continuity: the later part starts where the earlier one ends, or as far on as
 /// its last velocity carries, and moves as fast (median over up to 30 frames on each side).
-PositionResult FindPositions(const Orientations& orientations,
-                             const Camera& camera,
+PositionResult FindPositions(const Input& input,
+                             const Orientations& orientations,
                              const PipelineOptions& options,
                              int num_threads,
                              Progress& progress);
 
-/// The first part of FindPositions, up to bundle adjustment: what asks for the lens or the
+/// The first part of FindPositions, up to bundle adjustment, without images: what asks for the lens or the
 /// keyframes alone need not wait for the rest. Has no cloud, and the frames between keyframes no
 /// positions.
 PositionResult FindKeyframePositions(const Orientations& orientations,

@@ -36,7 +36,8 @@ BundleResult RefineComponent(const MapComponent& component,
                              const std::vector<Track>& tracks,
                              const std::vector<HeldStretch>& held,
                              const Camera& camera,
-                             const BundleOptions& options) {
+                             const BundleOptions& options,
+                             const TrackCompletion& complete) {
   BundleProblem problem;
   problem.camera = camera;
   for (const FrameId frame : component.keyframes) {
@@ -49,7 +50,7 @@ BundleResult RefineComponent(const MapComponent& component,
     }
   }
   problem.start.tracks = RestrictTracks(tracks, component.keyframes, 2);
-  return RefineBundle(problem, options);
+  return RefineBundle(problem, options, complete);
 }
 
 // Position of the component with the most observations.
@@ -88,18 +89,24 @@ RefinedComponents RefineComponents(const RotationMap& cam_from_world,
                                    const std::vector<Track>& tracks,
                                    const std::vector<HeldStretch>& held,
                                    const Camera& camera,
-                                   const BundleOptions& options) {
+                                   const BundleOptions& options,
+                                   const TrackCompletion& complete) {
   RefinedComponents refined;
   refined.camera = camera;
   refined.components = ComponentsOf(krot);
   refined.bundles.resize(refined.components.size());
   if (refined.components.empty()) return refined;
-  const auto refine = [&](std::size_t k,
-                          const std::vector<Track>& seen,
-                          const BundleOptions& bundle_options) {
-    refined.bundles[k] = RefineComponent(
-        refined.components[k], cam_from_world, krot, seen, held, refined.camera, bundle_options);
-  };
+  const auto refine =
+      [&](std::size_t k, const std::vector<Track>& seen, const BundleOptions& bundle_options) {
+        refined.bundles[k] = RefineComponent(refined.components[k],
+                                             cam_from_world,
+                                             krot,
+                                             seen,
+                                             held,
+                                             refined.camera,
+                                             bundle_options,
+                                             complete);
+      };
   const std::size_t first = LargestComponent(refined.components, tracks);
   refine(first, tracks, options);
   refined.camera = refined.bundles[first].camera;

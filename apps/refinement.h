@@ -29,12 +29,14 @@ struct RefinedComponents {
 /// @param tracks          those that the solution was found from; all are judged anew.
 /// @param held            stretches without movement: where both ends are keyframes of a component
 ///                        they share a centre.
+/// @param complete        as RefineBundle takes it.
 RefinedComponents RefineComponents(const RotationMap& cam_from_world,
                                    const KrotSolution& krot,
                                    const std::vector<Track>& tracks,
                                    const std::vector<HeldStretch>& held,
                                    const Camera& camera,
-                                   const BundleOptions& options);
+                                   const BundleOptions& options,
+                                   const TrackCompletion& complete = nullptr);
 
 /// Mean reprojection error over the observations of all bundles; zero where there are none.
 double MeanErrorPx(const std::vector<BundleSummary>& bundles);

@@ -87,7 +87,7 @@ int Run(const RunFlags& flags) {
 
   const PositionResult positions = [&] {
     const LastWords last_words(interruption, end_early);
-    return FindPositions(orientations, input.camera, options, flags.common.NumThreads(), progress);
+    return FindPositions(input, orientations, options, flags.common.NumThreads(), progress);
   }();
   const double positions_s = SecondsSince(start) - orientations_s - guess_s;
   WritePositions(outputs.folder(),

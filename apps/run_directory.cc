@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cerrno>
+#include <cmath>
 #include <iterator>
 #include <map>
 #include <set>
@@ -110,9 +111,20 @@ std::vector<std::string> CommentsOn(const std::vector<Segment>& segments) {
   return comments;
 }
 
-// Looks every sighting up among its frame's features, whose keypoint it is to the last bit.
-void FindLevels(const std::map<FrameId, Features>& features, RunMap& map) {
-  for (const auto& [frame, keypoints] : ListKeypoints(map)) {
+constexpr std::uint8_t kUnknownLevel = 255;
+
+// Gives each sighting of `tracks` that is in the map the level of its frame's feature whose
+// keypoint it is to the last bit.
+void FindLevels(const std::map<FrameId, Features>& features,
+                const std::vector<Track>& tracks,
+                RunMap& map) {
+  std::map<FrameId, std::vector<std::pair<TrackId, Eigen::Vector2d>>> sightings;
+  for (const Track& track : tracks) {
+    for (const Observation& seen : track.observations) {
+      sightings[seen.frame].emplace_back(track.id, seen.keypoint_px);
+    }
+  }
+  for (const auto& [frame, of_frame] : sightings) {
     const auto found = features.find(frame);
     if (found == features.end()) continue;
     std::map<std::pair<double, double>, int> level_at;
@@ -120,15 +132,67 @@ void FindLevels(const std::map<FrameId, Features>& features, RunMap& map) {
       const Eigen::Vector2d& keypoint_px = found->second.keypoints_px[k];
       level_at[{keypoint_px.x(), keypoint_px.y()}] = found->second.levels[k];
     }
-    for (const MapKeypoint& keypoint : keypoints) {
-      MapTrack& entry = map.tracks[keypoint.track];
-      const Eigen::Vector2d& keypoint_px =
-          entry.track.observations[keypoint.observation].keypoint_px;
+    for (const auto& [id, keypoint_px] : of_frame) {
       const auto level = level_at.find({keypoint_px.x(), keypoint_px.y()});
-      if (level == level_at.end()) continue;
-      entry.levels[keypoint.observation] = static_cast<std::uint8_t>(level->second);
+      const auto entry = std::lower_bound(
+          map.tracks.begin(), map.tracks.end(), id, [](const MapTrack& track, TrackId wanted) {
+            return track.track.id < wanted;
+          });
+      if (level == level_at.end() || entry == map.tracks.end() || entry->track.id != id) continue;
+      const std::vector<Observation>& observations = entry->track.observations;
+      for (std::size_t k = 0; k < observations.size(); ++k) {
+        if (observations[k].frame != frame) continue;
+        entry->levels[k] = static_cast<std::uint8_t>(level->second);
+      }
     }
   }
+}
+
+// Of sightings that the tracker did not make: as its nearest one shows the point, nearer or
+// farther.
+void GuessUnknownLevels(RunMap& map) {
+  std::map<FrameId, Eigen::Vector3d> centers;
+  for (const MapFrame& frame : map.frames) centers[frame.id] = frame.center_in_world;
+  for (MapTrack& entry : map.tracks) {
+    std::vector<std::size_t> known;
+    for (std::size_t k = 0; k < entry.levels.size(); ++k) {
+      if (entry.levels[k] != kUnknownLevel) known.push_back(k);
+    }
+    const std::vector<Observation>& observations = entry.track.observations;
+    const auto distance = [&](std::size_t k) {
+      return (*entry.point_in_world - centers.at(observations[k].frame)).norm();
+    };
+    const std::vector<std::uint8_t> levels = entry.levels;
+    for (std::size_t k = 0; k < levels.size(); ++k) {
+      if (levels[k] != kUnknownLevel) continue;
+      entry.levels[k] = 0;
+      if (known.empty()) continue;
+      const auto gap = [&](std::size_t other) {
+        return std::abs(observations[other].frame.value - observations[k].frame.value);
+      };
+      const std::size_t nearest =
+          *std::min_element(known.begin(), known.end(), [&](std::size_t a, std::size_t b) {
+            return gap(a) < gap(b);
+          });
+      entry.levels[k] = levels[nearest];
+      if (!entry.point_in_world) continue;
+      const double nearer = std::log(distance(nearest) / distance(k)) / std::log(map.level_scale);
+      entry.levels[k] = static_cast<std::uint8_t>(
+          std::clamp(std::lround(levels[nearest] + nearer), 0L, map.num_levels - 1L));
+    }
+  }
+}
+
+// Joins tracks, and finds the level that shows each sighting.
+// @param tracks  as the tracker made them.
+void SetTracks(const std::map<FrameId, Features>& features,
+               const std::vector<Track>& tracks,
+               std::vector<MapTrack> joined,
+               RunMap& map) {
+  map.tracks = std::move(joined);
+  for (MapTrack& entry : map.tracks) entry.levels.assign(entry.fits.size(), kUnknownLevel);
+  FindLevels(features, tracks, map);
+  GuessUnknownLevels(map);
 }
 
 }  // namespace
@@ -234,11 +298,12 @@ void WriteMaps(const std::filesystem::path& directory,
   for (const RelativeRotation& edge : orientations.graph.edges()) {
     map.edges.push_back({edge.i, edge.j, edge.num_inliers, edge.rotation_only});
   }
-  map.tracks = JoinTracks(positions.keyframe_tracks, positions.map);
-  FindLevels(orientations.features, map);
+  SetTracks(orientations.features,
+            positions.keyframe_tracks,
+            JoinTracks(positions.keyframe_tracks, positions.map),
+            map);
   WriteRunMap(directory / "map.bin", map);
-  map.tracks = JoinTracks({}, positions.cloud);
-  FindLevels(orientations.features, map);
+  SetTracks(orientations.features, positions.cloud.tracks, JoinTracks({}, positions.cloud), map);
   WriteRunMap(directory / "map_all_frames.bin", map);
 }
 
@@ -355,12 +420,14 @@ void AddBundles(const std::vector<BundleSummary>& bundles,
 
   // Sums over the components.
   std::int64_t observations = 0;
+  std::int64_t completed = 0;
   std::int64_t dropped = 0;
   std::int64_t iterations = 0;
   double initial_cost = 0.0;
   double final_cost = 0.0;
   for (const BundleSummary& bundle : bundles) {
     observations += bundle.num_observations;
+    completed += bundle.num_completed;
     dropped += bundle.num_dropped_observations;
     iterations += bundle.iterations;
     initial_cost += bundle.initial_cost;
@@ -371,6 +438,7 @@ void AddBundles(const std::vector<BundleSummary>& bundles,
         return a.num_observations < b.num_observations;
       });
   summary.ba = SummaryTable{{"observations", observations},
+                            {"completed_observations", completed},
                             {"dropped_observations", dropped},
                             {"iterations", iterations},
                             {"initial_cost", initial_cost},

@@ -234,12 +234,15 @@ class Rounds {
   BundleRound last_;
 };
 
+int NumObservations(const std::vector<Track>& tracks) {
+  int count = 0;
+  for (const Track& track : tracks) count += static_cast<int>(track.observations.size());
+  return count;
+}
+
 // Poses and well-fitting tracks of `state`.
-void TakeResult(const BundleProblem& problem, const BundleState& state, BundleResult& result) {
-  result.camera = state.camera;
-  Reconstruction& out = result.reconstruction;
-  out.cam_from_world = problem.start.cam_from_world;
-  std::vector<bool> center_seen(state.centers.size(), false);
+Reconstruction MapOf(const BundleState& state) {
+  Reconstruction map;
   for (const TrackState& entry : state.tracks) {
     if (entry.kind != TrackKind::kPoint) continue;
     Track track = *entry.track;
@@ -248,28 +251,54 @@ void TakeResult(const BundleProblem& problem, const BundleState& state, BundleRe
       if (!sight.used) continue;
       track.observations.push_back(*sight.observation);
       track.observations.back().bearing = sight.bearing;
-      center_seen[state.frames[sight.frame].center] = true;
     }
-    result.summary.num_observations += static_cast<int>(track.observations.size());
-    out.point_in_world[track.id] = entry.position;
-    out.tracks.push_back(std::move(track));
+    map.point_in_world[track.id] = entry.position;
+    map.tracks.push_back(std::move(track));
   }
   for (const FrameState& frame : state.frames) {
-    out.cam_from_world[frame.id] = frame.cam_from_world;
+    map.cam_from_world[frame.id] = frame.cam_from_world;
+    map.center_in_world[frame.id] = state.centers[frame.center];
+  }
+  return map;
+}
+
+// Gives the points other observations; how many more than they had.
+int Complete(const TrackCompletion& complete, BundleState& state) {
+  const Reconstruction map = MapOf(state);
+  std::vector<Track> tracks = complete(map, state.camera);
+  const int num_more = NumObservations(tracks) - NumObservations(map.tracks);
+  ReplaceTracks(std::move(tracks), state);
+  return num_more;
+}
+
+// Poses and well-fitting tracks of `state`.
+void TakeResult(const BundleProblem& problem, const BundleState& state, BundleResult& result) {
+  result.camera = state.camera;
+  std::vector<bool> center_seen(state.centers.size(), false);
+  for (const TrackState& entry : state.tracks) {
+    if (entry.kind != TrackKind::kPoint) continue;
+    for (const Sight& sight : entry.sights) {
+      if (sight.used) center_seen[state.frames[sight.frame].center] = true;
+    }
+  }
+  Reconstruction& out = result.reconstruction;
+  out = MapOf(state);
+  out.center_in_world.clear();
+  out.cam_from_world.insert(problem.start.cam_from_world.begin(),
+                            problem.start.cam_from_world.end());
+  result.summary.num_observations = NumObservations(out.tracks);
+  for (const FrameState& frame : state.frames) {
     if (center_seen[frame.center] || frame.fixed) {
       out.center_in_world[frame.id] = state.centers[frame.center];
     }
     if (frame.weak) result.weak_frames.push_back(frame.id);
   }
-  int num_given = 0;
-  for (const Track& track : problem.start.tracks) {
-    num_given += static_cast<int>(track.observations.size());
-  }
+  const int num_given = NumObservations(problem.start.tracks);
   BundleSummary& summary = result.summary;
   summary.num_frames = static_cast<int>(out.center_in_world.size());
   summary.num_points = static_cast<int>(out.tracks.size());
   summary.num_dropped_tracks = static_cast<int>(problem.start.tracks.size()) - summary.num_points;
-  summary.num_dropped_observations = num_given - summary.num_observations;
+  summary.num_dropped_observations = num_given + summary.num_completed - summary.num_observations;
 }
 
 }  // namespace
@@ -290,7 +319,9 @@ const char* Name(BundleStatus status) {
   return "unknown";
 }
 
-BundleResult RefineBundle(const BundleProblem& problem, const BundleOptions& options) {
+BundleResult RefineBundle(const BundleProblem& problem,
+                          const BundleOptions& options,
+                          const TrackCompletion& complete) {
   const auto start = std::chrono::steady_clock::now();
   BundleState state = MakeBundleState(problem, options);
   BundleResult result;
@@ -303,8 +334,18 @@ BundleResult RefineBundle(const BundleProblem& problem, const BundleOptions& opt
   rounds.Run("coarse", options.coarse, preparing);
   rounds.TryLens(options.coarse, preparing);
   rounds.Run("fine", options.fine, preparing);
-  const BundleRound close = FittedToResiduals(options.fine, options, preparing);
+  BundleRound close = FittedToResiduals(options.fine, options, preparing);
   if (part) TakeCameras(*part, state);
+  // What support is asked of.
+  std::optional<BundleState> given;
+  if (complete && rounds.good()) {
+    ClassifyAll(options.fine, Placement::kAnywhere, options, state);
+    given = state;
+    result.summary.num_completed = Complete(complete, state);
+    rounds.Run("completed", options.coarse, state);
+    rounds.Run("completed", options.fine, state);
+    close = FittedToResiduals(options.fine, options, state);
+  }
   rounds.Close(close, part ? Placement::kAnywhere : Placement::kNearby, state);
 
   BundleSummary& summary = result.summary;
@@ -312,14 +353,15 @@ BundleResult RefineBundle(const BundleProblem& problem, const BundleOptions& opt
   if (!summary.rounds.empty()) {
     const auto whole = std::find_if(
         summary.rounds.begin(), summary.rounds.end(), [&](const BundleRoundSummary& round) {
-          return round.name == (in_part ? "close" : "fine");
+          return round.name == "completed" || round.name == (in_part ? "close" : "fine");
         });
     const auto first = whole == summary.rounds.end() ? summary.rounds.begin() : whole;
     summary.initial_cost = first->initial_cost;
     summary.final_cost = summary.rounds.back().final_cost;
   }
   if (rounds.good()) {
-    summary.support = SupportWithin(options.fine, options, state);
+    if (given) TakeCameras(state, *given);
+    summary.support = SupportWithin(options.fine, options, given ? *given : state);
     ClassifyAll(rounds.last(), Placement::kStays, options, state);
     summary.after = Statistics(state);
     rounds.FindCovariances(options.fine, state);

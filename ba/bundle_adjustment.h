@@ -1,5 +1,6 @@
 #pragma once
 
+#include <functional>
 #include <map>
 #include <optional>
 #include <set>
@@ -78,8 +79,9 @@ struct BundleRoundSummary {
   double solver_seconds = 0.0;
 };
 
-/// What points explain within the fine round's limit, however narrow the last round was: of two
-/// models of a sequence both are asked the same.
+/// What points explain within the fine round's limit, however narrow the last round was, of the
+/// observations given, not those that completion has found: of two models of a sequence both are
+/// asked the same.
 struct BundleSupport {
   int num_frames = 0;
   int num_points = 0;
@@ -98,8 +100,9 @@ struct BundleSummary {
   int num_frames = 0;
   int num_points = 0;
   int num_observations = 0;
+  int num_completed = 0;             // observations that completion has added
   int num_dropped_tracks = 0;        // of the tracks given
-  int num_dropped_observations = 0;  // of the observations given, dropped tracks' included
+  int num_dropped_observations = 0;  // of those given or added, dropped tracks' included
   double lens_gain = 0.0;     // share of the cost that another lens took off, see LensOptions
   bool lens_refined = false;  // whether that was enough
   std::optional<LensSigmas> lens_sigmas;  // where it was, with `options.find_covariance`
@@ -133,6 +136,13 @@ struct BundleResult {
   }
 };
 
+/// Finds more of what the points' images show, once they are known to a few pixels.
+/// @param map     poses, points and tracks, with the observations that fit.
+/// @param camera  as it is refined; the observations' bearings are its.
+/// @return  tracks of the map with other observations.
+using TrackCompletion =
+    std::function<std::vector<Track>(const Reconstruction& map, const Camera& camera)>;
+
 /// Minimises the robust reprojection error over rotations, centres and points, in rounds that start
 /// with the rotations held (`options.bridge`), then let them go on what fits (`options.coarse`,
 /// `options.fine`). Before every round all tracks are triangulated anew against the cameras of that
@@ -141,6 +151,8 @@ struct BundleResult {
 /// @param problem  as documented there. Throws std::invalid_argument on numbers that are
 /// not finite, sigmas that are not positive, doubled track ids or frames within a track, frames in
 /// `shared_center` or `fixed_frames` without a pose, cycles in `shared_center`.
+/// @param complete  when given, called after the preparing rounds; the tracks it returns take the
+/// place of those with their ids.
 /// @return  status kTooLittleData for an empty problem or one without parallax; else the gauge of
 /// the start: the first well-observed frame keeps its pose to the last bit and the farthest centre
 /// its distance along the line between them. With `fixed_frames` these keep theirs. Same bytes at
@@ -150,7 +162,9 @@ struct BundleResult {
 /// rounds of 67 cameras, 13,000 points and 84,000 observations take 2 to 3 s.
 /// Source:  Triggs et al., Bundle Adjustment - A Modern Synthesis, 1999; the chain of rounds is
 /// ours.
-BundleResult RefineBundle(const BundleProblem& problem, const BundleOptions& options);
+BundleResult RefineBundle(const BundleProblem& problem,
+                          const BundleOptions& options,
+                          const TrackCompletion& complete = nullptr);
 
 /// Triangulates all tracks of `problem` against its cameras, which stay as they are, and keeps the
 /// observations within `options.fine.max_error_px`: more points, seen from more frames, for a

@@ -5,6 +5,7 @@
 #include <set>
 #include <stdexcept>
 #include <string>
+#include <utility>
 
 namespace rotslam {
 namespace {
@@ -79,19 +80,48 @@ FrameId CenterOwner(const std::map<FrameId, FrameId>& shared_center, FrameId fra
 
 }  // namespace
 
+namespace {
+
+using FrameIndex = std::map<FrameId, int>;
+
+FrameIndex IndexFrames(const BundleState& state) {
+  FrameIndex index;
+  for (std::size_t k = 0; k < state.frames.size(); ++k) {
+    index[state.frames[k].id] = static_cast<int>(k);
+  }
+  return index;
+}
+
+// The track's observations in frames that have a pose.
+void SetTrack(const Track& track,
+              const FrameIndex& frame_index,
+              const BundleState& state,
+              TrackState& entry) {
+  entry.track = &track;
+  entry.sights.clear();
+  std::set<int> places;
+  for (const Observation& observation : track.observations) {
+    const auto frame = frame_index.find(observation.frame);
+    if (frame == frame_index.end()) continue;
+    entry.sights.push_back({&observation, observation.bearing, frame->second, false});
+    places.insert(state.frames[frame->second].center);
+  }
+  entry.one_place = places.size() <= 1;
+}
+
+}  // namespace
+
 BundleState MakeBundleState(const BundleProblem& problem, const BundleOptions& options) {
   CheckContract(problem, options);
   BundleState state;
   state.camera = problem.camera;
   const Reconstruction& start = problem.start;
-  std::map<FrameId, int> frame_index;
   std::map<FrameId, int> center_index;
   for (const auto& [id, cam_from_world] : start.cam_from_world) {
     if (!start.center_in_world.contains(id)) continue;
     const FrameId owner = CenterOwner(problem.shared_center, id);
     const auto [center, is_new] = center_index.try_emplace(owner, state.centers.size());
     if (is_new) state.centers.push_back(start.center_in_world.at(owner));
-    frame_index[id] = static_cast<int>(state.frames.size());
     FrameState frame;
     frame.id = id;
     frame.cam_from_world = cam_from_world;
@@ -99,17 +129,10 @@ BundleState MakeBundleState(const BundleProblem& problem, const BundleOptions& o
     frame.fixed = problem.fixed_frames.contains(id);
     state.frames.push_back(frame);
   }
+  const FrameIndex frame_index = IndexFrames(state);
   for (const Track& track : start.tracks) {
     TrackState entry;
-    entry.track = &track;
-    std::set<int> places;
-    for (const Observation& observation : track.observations) {
-      const auto frame = frame_index.find(observation.frame);
-      if (frame == frame_index.end()) continue;
-      entry.sights.push_back({&observation, observation.bearing, frame->second, false});
-      places.insert(state.frames[frame->second].center);
-    }
-    entry.one_place = places.size() <= 1;
+    SetTrack(track, frame_index, state, entry);
     const auto point = start.point_in_world.find(track.id);
     if (point != start.point_in_world.end() && !entry.one_place) {
       entry.has_position = true;
@@ -118,6 +141,19 @@ BundleState MakeBundleState(const BundleProblem& problem, const BundleOptions& o
     state.tracks.push_back(std::move(entry));
   }
   return state;
+}
+
+void ReplaceTracks(std::vector<Track> tracks, BundleState& state) {
+  const auto replaced = std::make_shared<const std::vector<Track>>(std::move(tracks));
+  std::map<TrackId, const Track*> by_id;
+  for (const Track& track : *replaced) by_id[track.id] = &track;
+  const FrameIndex frame_index = IndexFrames(state);
+  for (TrackState& entry : state.tracks) {
+    const auto track = by_id.find(entry.track->id);
+    if (track != by_id.end()) SetTrack(*track->second, frame_index, state, entry);
+  }
+  state.replaced = replaced;
+  SetCamera(state.camera, state);
 }
 
 void SetCamera(const Camera& camera, BundleState& state) {

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <memory>
 #include <vector>
 
 #include <Eigen/Core>
@@ -45,12 +46,17 @@ struct BundleState {
   std::vector<FrameState> frames;
   std::vector<Eigen::Vector3d> centers;
   std::vector<TrackState> tracks;
+  // Where tracks are that are not the problem's any more.
+  std::shared_ptr<const std::vector<Track>> replaced;
 };
 
 /// The problem's poses and the tracks that they see, nothing classified yet. The tracks stay the
 /// problem's: it must outlive the state.
 /// Throws std::invalid_argument where the contract of RefineBundle is broken.
 BundleState MakeBundleState(const BundleProblem& problem, const BundleOptions& options);
+
+/// Replaces those of the state's tracks that have the ids of `tracks`. Where they are stays.
+void ReplaceTracks(std::vector<Track> tracks, BundleState& state);
 
 /// Replaces the camera, and the bearings with it.
 void SetCamera(const Camera& camera, BundleState& state);

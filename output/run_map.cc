@@ -142,6 +142,27 @@ MapTrack WithoutPoint(const Track& track) {
           std::vector<std::uint8_t>(track.observations.size(), 0)};
 }
 
+// @param given  of the same track; those in frames that fit are not taken.
+MapTrack WithPoint(const Track& track,
+                   const Eigen::Vector3d& point_in_world,
+                   const std::vector<Observation>& given) {
+  std::map<FrameId, std::pair<Observation, bool>> sightings;
+  for (const Observation& observation : given) sightings[observation.frame] = {observation, false};
+  for (const Observation& observation : track.observations) {
+    sightings[observation.frame] = {observation, true};
+  }
+  MapTrack entry;
+  entry.track = track;
+  entry.track.observations.clear();
+  entry.point_in_world = point_in_world;
+  for (const auto& [frame, sighting] : sightings) {
+    entry.track.observations.push_back(sighting.first);
+    entry.fits.push_back(sighting.second);
+  }
+  entry.levels.resize(entry.fits.size(), 0);
+  return entry;
+}
+
 }  // namespace
 
 std::vector<MapTrack> JoinTracks(const std::vector<Track>& tracks, const Reconstruction& solved) {
@@ -152,14 +173,7 @@ std::vector<MapTrack> JoinTracks(const std::vector<Track>& tracks, const Reconst
   for (const Track& track : solved.tracks) {
     const auto point = solved.point_in_world.find(track.id);
     if (point == solved.point_in_world.end()) continue;
-    MapTrack& entry = joined[track.id];
-    if (entry.fits.empty()) entry = WithoutPoint(track);
-    entry.point_in_world = point->second;
-    std::set<FrameId> fitting;
-    for (const Observation& observation : track.observations) fitting.insert(observation.frame);
-    for (std::size_t k = 0; k < entry.fits.size(); ++k) {
-      entry.fits[k] = fitting.contains(entry.track.observations[k].frame);
-    }
+    joined[track.id] = WithPoint(track, point->second, joined[track.id].track.observations);
   }
   std::vector<MapTrack> list;
   list.reserve(joined.size());

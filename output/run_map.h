@@ -53,8 +53,10 @@ struct RunMap {
 };
 
 /// Puts tracks and what was made of them together; levels are all 0.
-/// @param tracks  all sightings; those of tracks that only `solved` has are taken from there.
-/// @param solved  its tracks hold the sightings that fit; only those with a point count.
+/// @param tracks  all sightings.
+/// @param solved  its tracks hold the sightings that fit, which stand in for those given of the
+/// same
+///                track and frame; only tracks with a point count.
 std::vector<MapTrack> JoinTracks(const std::vector<Track>& tracks, const Reconstruction& solved);
 
 /// The part of a map that stands on its keyframes: other frames go, and their sightings, and tracks

@@ -177,6 +177,7 @@ TEST_P(OnBothSequences, SummarySaysWhatWasDone) {
             summary["krot"]["gamma_high"].get<double>());
   EXPECT_LE(summary["ba"]["final_cost"].get<double>(), summary["ba"]["initial_cost"].get<double>());
   EXPECT_LT(summary["ba"]["mean_error_px"].get<double>(), 0.5);
+  EXPECT_GT(summary["ba"]["completed_observations"].get<int>(), 0);
   EXPECT_EQ(summary["camera"]["model"], "pinhole");
 }
 

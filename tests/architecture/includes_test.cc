@@ -29,6 +29,8 @@ const std::map<Folder, std::set<Folder>> kAllowed = {
       "rotodom/features",
       "rotodom/matching",
       "rotodom/relative_rotation"}},
+    {"rotodom/completion",
+     {"rotodom/types", "rotodom/camera", "rotodom/features", "rotodom/tracking"}},
     {"rotodom/view_graph",
      {"rotodom/types", "rotodom/features", "rotodom/relative_rotation", "rotodom/tracks"}},
     {"rotodom", {"rotodom/types", "rotodom/averaging", "rotodom/tracking", "rotodom/view_graph"}},

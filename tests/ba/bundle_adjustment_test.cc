@@ -52,6 +52,48 @@ TEST(RefineBundle, FindsTheTruthOnACleanStreet) {
   EXPECT_GT(result.summary.num_points, 380);  // all but the shallow ones
 }
 
+TEST(RefineBundle, AdjustsWhatIsFoundByTheWay) {
+  const BaScene scene = MakeBaScene({.noise_px = 0.5});
+  BundleProblem problem = PerturbedProblem(scene, 0.1, 0.5);
+  const std::vector<Track> whole = problem.start.tracks;
+  // What a tracker would have left of them.
+  int num_given = 0;
+  for (Track& track : problem.start.tracks) {
+    if (track.observations.size() > 4) track.observations.resize(4);
+    num_given += static_cast<int>(track.observations.size());
+  }
+  const BundleResult before = RefineBundle(problem, {});
+  int num_calls = 0;
+  int num_found = 0;
+  const TrackCompletion complete = [&](const Reconstruction& map, const Camera& camera) {
+    ++num_calls;
+    EXPECT_EQ(camera.fx, scene.camera.fx);
+    EXPECT_EQ(map.tracks.size(), map.point_in_world.size());
+    std::vector<Track> tracks;
+    for (const Track& track : map.tracks) {
+      EXPECT_LE(track.observations.size(), 4U);
+      for (const Track& other : whole) {
+        if (other.id == track.id) tracks.push_back(other);
+      }
+      num_found += static_cast<int>(tracks.back().observations.size() - track.observations.size());
+    }
+    return tracks;
+  };
+  const BundleResult after = RefineBundle(problem, {}, complete);
+  ASSERT_TRUE(before.Usable() && after.Usable()) << after.message;
+  EXPECT_EQ(num_calls, 1);
+  EXPECT_GT(num_found, num_given / 4);
+  EXPECT_EQ(after.summary.num_completed, num_found);
+  EXPECT_EQ(after.summary.num_observations + after.summary.num_dropped_observations,
+            num_given + num_found);
+  EXPECT_EQ(before.summary.num_completed, 0);
+  EXPECT_LT(CenterError(after.reconstruction, scene.truth),
+            0.8 * CenterError(before.reconstruction, scene.truth));
+  // Of two models of a sequence both are asked the same.
+  EXPECT_LE(after.summary.support.num_observations, num_given);
+  EXPECT_GT(after.summary.support.num_observations, 0.9 * num_given);
+}
+
 TEST(RefineBundle, KeepsTheFirstPoseAndTheScaleOfTheStart) {
   const BaScene scene = MakeBaScene({.noise_px = 0.5});
   const BundleProblem problem = PerturbedProblem(scene, 0.1, 0.3);

@@ -137,5 +137,26 @@ TEST(JoinTracks, MarksTheSightingsThatFit) {
   EXPECT_EQ(CountFits(joined.back()), static_cast<int>(unknown.observations.size()));
 }
 
+TEST(JoinTracks, TakesTheSightingsThatTheSolutionHas) {
+  const Scene scene = ExportScene();
+  Track given = scene.tracks[2];
+  Reconstruction solved;
+  solved.tracks = {given};
+  solved.point_in_world[given.id] = Eigen::Vector3d(1.0, 2.0, 3.0);
+  // One sighting was measured anew, and one is the solution's alone.
+  solved.tracks[0].observations[0].keypoint_px += Eigen::Vector2d(3.0, -2.0);
+  given.observations.erase(given.observations.begin() + 1);
+  const std::vector<MapTrack> joined = JoinTracks({given}, solved);
+  ASSERT_EQ(joined.size(), 1u);
+  ASSERT_EQ(joined[0].track.observations.size(), solved.tracks[0].observations.size());
+  EXPECT_EQ(CountFits(joined[0]), static_cast<int>(joined[0].fits.size()));
+  EXPECT_EQ(joined[0].levels.size(), joined[0].fits.size());
+  for (std::size_t k = 0; k < joined[0].fits.size(); ++k) {
+    EXPECT_EQ(joined[0].track.observations[k].frame, solved.tracks[0].observations[k].frame);
+    EXPECT_EQ(joined[0].track.observations[k].keypoint_px,
+              solved.tracks[0].observations[k].keypoint_px);
+  }
+}
+
 }  // namespace
 }  // namespace rotslam

@@ -1,0 +1,24 @@
+#pragma once
+
+#include <set>
+#include <string>
+
+#include "apps/orientations.h"
+#include "rotodom/completion/completion.h"
+#include "rotodom/sequence/sequence.h"
+
+namespace rotslam {
+
+/// The images of `frames`, read anew.
+/// @param path     of the sequence; `options` as it was read the first time.
+/// @param problem  receives one line where an image cannot be read again; the rest are there.
+MapViews ReadMapViews(const std::string& path,
+                      const SequenceOptions& options,
+                      const std::set<FrameId>& frames,
+                      std::string& problem);
+
+/// Gives the views the motion that a rolling shutter sees: the rotation rate between the frames
+/// before and after each, the velocity between the views of the map before and after.
+void SetMotions(const Orientations& orientations, const Reconstruction& map, MapViews& views);
+
+}  // namespace rotslam
