@@ -178,7 +178,7 @@ void GuessUnknownLevels(RunMap& map) {
       if (!entry.point_in_world) continue;
       const double nearer = std::log(distance(nearest) / distance(k)) / std::log(map.level_scale);
       entry.levels[k] = static_cast<std::uint8_t>(
-          std::clamp(std::lround(levels[nearest] + nearer), 0L, map.num_levels - 1L));
+          std::lround(std::clamp(levels[nearest] + nearer, 0.0, map.num_levels - 1.0)));
     }
   }
 }

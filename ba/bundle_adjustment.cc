@@ -342,9 +342,12 @@ BundleResult RefineBundle(const BundleProblem& problem,
     ClassifyAll(options.fine, Placement::kAnywhere, options, state);
     given = state;
     result.summary.num_completed = Complete(complete, state);
-    rounds.Run("completed", options.coarse, state);
-    rounds.Run("completed", options.fine, state);
-    close = FittedToResiduals(options.fine, options, state);
+    if (part) part = WithSomeTracks(state, options.preparing_observations);
+    BundleState& completed = part ? *part : state;
+    rounds.Run("completed", options.coarse, completed);
+    rounds.Run("completed", options.fine, completed);
+    close = FittedToResiduals(options.fine, options, completed);
+    if (part) TakeCameras(*part, state);
   }
   rounds.Close(close, part ? Placement::kAnywhere : Placement::kNearby, state);
 
@@ -353,7 +356,7 @@ BundleResult RefineBundle(const BundleProblem& problem,
   if (!summary.rounds.empty()) {
     const auto whole = std::find_if(
         summary.rounds.begin(), summary.rounds.end(), [&](const BundleRoundSummary& round) {
-          return round.name == "completed" || round.name == (in_part ? "close" : "fine");
+          return round.name == (in_part ? "close" : "fine");
         });
     const auto first = whole == summary.rounds.end() ? summary.rounds.begin() : whole;
     summary.initial_cost = first->initial_cost;
