@@ -46,9 +46,9 @@ PositionResult FindPositions(const Input& input,
                              int num_threads,
                              Progress& progress);
 
-/// The first part of FindPositions, up to bundle adjustment, without images: what asks for the lens or the
-/// keyframes alone need not wait for the rest. Has no cloud, and the frames between keyframes no
-/// positions.
+/// The first part of FindPositions, up to bundle adjustment, without images: what asks for the lens
+/// or the keyframes alone need not wait for the rest. Has no cloud, and the frames between
+/// keyframes no positions.
 PositionResult FindKeyframePositions(const Orientations& orientations,
                                      const Camera& camera,
                                      const PipelineOptions& options,
