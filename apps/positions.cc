@@ -195,7 +195,7 @@ std::vector<Track> TracksOf(const Orientations& orientations) {
       orientations.edge_matches, orientations.features, AllFrames(orientations.cam_from_world), 2);
 }
 
-// Completes tracks with the images of `frames`; null where that is not asked for.
+// Completes tracks with the images of the map's frames; null where that is not asked for.
 TrackCompletion CompletionWith(const Input& input,
                                const Orientations& orientations,
                                const PipelineOptions& options,
@@ -207,8 +207,9 @@ TrackCompletion CompletionWith(const Input& input,
     for (const auto& [frame, center] : map.center_in_world) frames.insert(frame);
     std::string problem;
     MapViews views = ReadMapViews(input.path, options.sequence, frames, problem);
-    if (!problem.empty())
+    if (!problem.empty()) {
       progress.Warn(problem + "; points are not looked for in images that cannot be read again");
+    }
     SetMotions(orientations, map, views);
     return CompleteTracks(map, views, camera, options.completion, num_threads);
   };

@@ -68,13 +68,15 @@ class Completion {
     if (point == map_.point_in_world.end()) return track;
     const Observation* reference = FindReference(track, point->second);
     if (reference == nullptr) return track;
-    const int from = index_.at(reference->frame);
+    const PosedView& source = views_[index_.at(reference->frame)];
+    const auto here = PlaceOf(source, point->second);
+    if (!here) return track;
     std::map<FrameId, Observation> observations;
     for (const Observation& observation : track.observations) {
       observations[observation.frame] = observation;
     }
-    for (const int to : views_[from].nearest) {
-      const auto found_px = Find(*reference, from, to, point->second);
+    for (const int to : source.nearest) {
+      const auto found_px = Find(*reference, source, *here, views_[to], point->second);
       if (!found_px) continue;
       const auto bearing = camera_.Unproject(*found_px);
       if (!bearing) continue;
@@ -178,13 +180,13 @@ class Completion {
     return Eigen::Matrix2d(to_plane * from_plane.inverse());
   }
 
-  // Where view `to` shows what view `from` shows at the reference's keypoint, as in mid-frame.
+  // Where the target shows what the source shows at the reference's keypoint, as in mid-frame.
+  // @param here  where the source shows the point.
   std::optional<Eigen::Vector2d> Find(const Observation& reference,
-                                      int from,
-                                      int to,
+                                      const PosedView& source,
+                                      const Place& here,
+                                      const PosedView& target,
                                       const Eigen::Vector3d& point) const {
-    const PosedView& source = views_[from];
-    const PosedView& target = views_[to];
     const Eigen::Vector3d source_ray = point - source.center_in_world;
     const Eigen::Vector3d target_ray = point - target.center_in_world;
     const double ratio = source_ray.norm() / target_ray.norm();
@@ -196,10 +198,8 @@ class Completion {
     }
     const auto there = PlaceOf(target, point);
     if (!there || !IsInside(there->image_px)) return std::nullopt;
-    const auto here = PlaceOf(source, point);
-    if (!here) return std::nullopt;
-    const Eigen::Vector2d source_px = reference.keypoint_px + (here->image_px - here->mid_frame_px);
-    const auto warp = Warp(*here, *there);
+    const Eigen::Vector2d source_px = reference.keypoint_px + (here.image_px - here.mid_frame_px);
+    const auto warp = Warp(here, *there);
     if (!warp) return std::nullopt;
 
     Eigen::Vector2d px = there->image_px;
@@ -209,7 +209,7 @@ class Completion {
     }
     const auto patch = PatchTemplate::Sample(source.view->image, source_px, *warp);
     if (!patch) return std::nullopt;
-    auto found = AlignPatch(*patch, target.view->image, px, options_.reach_px);
+    const auto found = AlignPatch(*patch, target.view->image, px, options_.reach_px);
     if (!found || found->correlation < options_.min_correlation) return std::nullopt;
     if ((found->center_px - there->image_px).norm() > options_.reach_px) return std::nullopt;
     const auto back = PatchTemplate::Sample(target.view->image, found->center_px, warp->inverse());
