@@ -11,7 +11,7 @@ namespace rotslam {
 MapViews ReadMapViews(const std::string& path,
                       const SequenceOptions& options,
                       const std::set<FrameId>& frames,
-                      std::string& problem) {
+                      const std::function<void(const std::string&)>& tell) {
   MapViews views;
   try {
     const std::unique_ptr<Sequence> sequence = OpenSequence(path, options);
@@ -21,17 +21,17 @@ MapViews ReadMapViews(const std::string& path,
       next = wanted.value + 1;
       const std::optional<Frame> frame = sequence->Next();
       if (!frame) {
-        problem = path + ": ends before frame " + std::to_string(wanted.value);
+        tell(path + ": ends before frame " + std::to_string(wanted.value));
         return views;
       }
       if (frame->image.empty()) {
-        problem = path + ": " + frame->name + ": " + frame->problem;
+        tell(path + ": " + frame->name + ": " + frame->problem);
         continue;
       }
       views[wanted] = MakeMapView(frame->image);
     }
   } catch (const std::exception& error) {
-    problem = error.what();
+    tell(error.what());
   }
   return views;
 }

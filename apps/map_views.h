@@ -1,5 +1,6 @@
 #pragma once
 
+#include <functional>
 #include <set>
 #include <string>
 
@@ -10,12 +11,12 @@
 namespace rotslam {
 
 /// The images of `frames`, read anew.
-/// @param path     of the sequence; `options` as it was read the first time.
-/// @param problem  receives one line where an image cannot be read again; the rest are there.
+/// @param path  of the sequence; `options` as it was read the first time.
+/// @param tell  receives one line for each image that cannot be read again; the rest are there.
 MapViews ReadMapViews(const std::string& path,
                       const SequenceOptions& options,
                       const std::set<FrameId>& frames,
-                      std::string& problem);
+                      const std::function<void(const std::string&)>& tell);
 
 /// Gives the views the motion that a rolling shutter sees: the rotation rate between the frames
 /// before and after each, the velocity between the views of the map before and after.

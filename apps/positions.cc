@@ -205,11 +205,11 @@ TrackCompletion CompletionWith(const Input& input,
   return [&, num_threads](const Reconstruction& map, const Camera& camera) {
     std::set<FrameId> frames;
     for (const auto& [frame, center] : map.center_in_world) frames.insert(frame);
-    std::string problem;
-    MapViews views = ReadMapViews(input.path, options.sequence, frames, problem);
-    if (!problem.empty()) {
-      progress.Warn(problem + "; points are not looked for in images that cannot be read again");
-    }
+    MapViews views =
+        ReadMapViews(input.path, options.sequence, frames, [&](const std::string& problem) {
+          progress.Warn(problem +
+                        "; points are not looked for in images that cannot be read again");
+        });
     SetMotions(orientations, map, views);
     return CompleteTracks(map, views, camera, options.completion, num_threads);
   };

@@ -35,12 +35,6 @@ std::vector<Track> SampleOf(const std::vector<Track>& tracks) {
 
 }  // namespace
 
-int NumObservations(const std::vector<Track>& tracks) {
-  std::size_t sum = 0;
-  for (const Track& track : tracks) sum += track.observations.size();
-  return static_cast<int>(sum);
-}
-
 Explanation ExplanationBy(const std::vector<BundleSummary>& bundles) {
   Explanation sum;
   for (const BundleSummary& bundle : bundles) {

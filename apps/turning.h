@@ -8,8 +8,6 @@
 
 namespace rotslam {
 
-int NumObservations(const std::vector<Track>& tracks);
-
 /// What speaks for a model of a sequence.
 struct Explanation {
   int num_observations = 0;  // that it explains

@@ -234,12 +234,6 @@ class Rounds {
   BundleRound last_;
 };
 
-int NumObservations(const std::vector<Track>& tracks) {
-  int count = 0;
-  for (const Track& track : tracks) count += static_cast<int>(track.observations.size());
-  return count;
-}
-
 // Poses and well-fitting tracks of `state`.
 Reconstruction MapOf(const BundleState& state) {
   Reconstruction map;

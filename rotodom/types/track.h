@@ -26,4 +26,7 @@ struct Track {
   std::array<std::uint8_t, 3> rgb = {128, 128, 128};
 };
 
+/// Observations of all of them.
+int NumObservations(const std::vector<Track>& tracks);
+
 }  // namespace rotslam

@@ -1,7 +1,9 @@
 #include "apps/map_views.h"
 
 #include <filesystem>
+#include <set>
 #include <string>
+#include <vector>
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -13,6 +15,9 @@ namespace rotslam {
 namespace {
 
 namespace fs = std::filesystem;
+using ::testing::ElementsAre;
+using ::testing::HasSubstr;
+using ::testing::IsEmpty;
 
 // Images 0.png to 5.png, each of one grey value: ten times its number.
 class MapViewsTest : public testing::Test {
@@ -24,14 +29,22 @@ class MapViewsTest : public testing::Test {
     }
   }
 
+  MapViews Read(const std::string& path,
+                const SequenceOptions& options,
+                const std::set<FrameId>& frames) {
+    problems_.clear();
+    return ReadMapViews(
+        path, options, frames, [&](const std::string& problem) { problems_.push_back(problem); });
+  }
+
   const TemporaryFolder folder_;
+  std::vector<std::string> problems_;
 };
 
 TEST_F(MapViewsTest, AreTheImagesOfTheFramesAskedFor) {
-  std::string problem;
-  const MapViews views = ReadMapViews(
-      folder_.path().string(), {.first = 1, .stride = 2}, {FrameId{0}, FrameId{2}}, problem);
-  EXPECT_EQ(problem, "");
+  const MapViews views =
+      Read(folder_.path().string(), {.first = 1, .stride = 2}, {FrameId{0}, FrameId{2}});
+  EXPECT_THAT(problems_, IsEmpty());
   ASSERT_EQ(views.size(), 2U);
   EXPECT_EQ(views.at(FrameId{0}).image.at<std::uint8_t>(3, 4), 10);
   EXPECT_EQ(views.at(FrameId{2}).image.at<std::uint8_t>(3, 4), 50);
@@ -40,17 +53,14 @@ TEST_F(MapViewsTest, AreTheImagesOfTheFramesAskedFor) {
 
 TEST_F(MapViewsTest, SayWhatCannotBeReadAgain) {
   const std::string path = folder_.path().string();
-  const fs::path gone = folder_.path() / "3.png";
-  fs::resize_file(gone, 10);
-  std::string problem;
-  EXPECT_EQ(ReadMapViews(path, {}, {FrameId{2}, FrameId{3}, FrameId{4}}, problem).size(), 2U);
-  EXPECT_THAT(problem, testing::HasSubstr("3.png"));
-  problem.clear();
-  EXPECT_EQ(ReadMapViews(path, {}, {FrameId{2}, FrameId{9}}, problem).size(), 1U);
-  EXPECT_THAT(problem, testing::HasSubstr("frame 9"));
-  problem.clear();
-  EXPECT_TRUE(ReadMapViews(path + "/nowhere", {}, {FrameId{2}}, problem).empty());
-  EXPECT_THAT(problem, testing::HasSubstr("nowhere"));
+  fs::resize_file(folder_.path() / "3.png", 10);
+  fs::resize_file(folder_.path() / "4.png", 0);
+  EXPECT_EQ(Read(path, {}, {FrameId{2}, FrameId{3}, FrameId{4}, FrameId{5}}).size(), 2U);
+  EXPECT_THAT(problems_, ElementsAre(HasSubstr("3.png"), HasSubstr("4.png")));
+  EXPECT_EQ(Read(path, {}, {FrameId{2}, FrameId{9}}).size(), 1U);
+  EXPECT_THAT(problems_, ElementsAre(HasSubstr("frame 9")));
+  EXPECT_TRUE(Read(path + "/nowhere", {}, {FrameId{2}}).empty());
+  EXPECT_THAT(problems_, ElementsAre(HasSubstr("nowhere")));
 }
 
 TEST(SetMotions, TakesThemFromTheFramesAround) {

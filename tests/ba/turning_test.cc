@@ -26,12 +26,6 @@ Camera WithFocal(Camera camera, double factor) {
   return camera;
 }
 
-int NumObservations(const std::vector<Track>& tracks) {
-  int sum = 0;
-  for (const Track& track : tracks) sum += static_cast<int>(track.observations.size());
-  return sum;
-}
-
 double LargestErrorDeg(const RotationMap& found, const RotationMap& truth) {
   double largest = 0.0;
   for (const auto& [frame, cam_from_world] : found) {

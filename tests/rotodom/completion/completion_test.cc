@@ -186,12 +186,6 @@ std::vector<double> DisagreementsPx(const Walk& walk, const std::vector<Track>& 
   return disagreements_px;
 }
 
-int NumObservations(const std::vector<Track>& tracks) {
-  int count = 0;
-  for (const Track& track : tracks) count += static_cast<int>(track.observations.size());
-  return count;
-}
-
 void ExpectFindsNearlyAll(const Walk& walk, double median_px) {
   const std::vector<Track> tracks = walk.Complete();
   ASSERT_EQ(tracks.size(), walk.map.tracks.size());
