@@ -6,6 +6,7 @@
 #include <cstdint>
 #include <cstdio>
 #include <iterator>
+#include <set>
 #include <stdexcept>
 #include <utility>
 
@@ -52,6 +53,29 @@ std::vector<FrameId> FindBreaks(const ViewGraph& graph, const RotationMap& rotat
     is_first = false;
   }
   return breaks;
+}
+
+// The places of loops that were not accepted, and some before and behind them.
+std::map<FrameId, Features> DoubtfulPlaces(std::map<FrameId, Features> places,
+                                           const std::vector<LoopCheck>& loops) {
+  constexpr int kAround = 3;
+  std::set<FrameId> doubtful;
+  const auto add_around = [&](FrameId frame) {
+    const auto place = places.find(frame);
+    if (place == places.end()) return;
+    auto from = place;
+    for (int k = 0; k < kAround && from != places.begin(); ++k) --from;
+    auto to = place;
+    for (int k = 0; k <= kAround && to != places.end(); ++k) ++to;
+    for (; from != to; ++from) doubtful.insert(from->first);
+  };
+  for (const LoopCheck& loop : loops) {
+    if (loop.accepted) continue;
+    add_around(loop.frame);
+    add_around(loop.match);
+  }
+  std::erase_if(places, [&](const auto& place) { return !doubtful.contains(place.first); });
+  return places;
 }
 
 // Loops right round measure the scale of all turns.
@@ -189,6 +213,8 @@ Orientations FindOrientations(Input& input,
   const std::vector<LoopCheck> last_loops = odometry.Finish();
   orientations.loops.insert(orientations.loops.end(), last_loops.begin(), last_loops.end());
   orientations.num_places = odometry.num_places();
+  if (keep_features)
+    orientations.places = DoubtfulPlaces(odometry.TakePlaces(), orientations.loops);
   orientations.seconds = odometry.odometry_seconds();
   orientations.loop_seconds = odometry.loop_seconds();
   orientations.global_averaging_seconds = odometry.averaging_seconds();

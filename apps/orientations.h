@@ -33,6 +33,9 @@ struct Orientations : OdometryResult {
   std::vector<FrameId> breaks;
   std::vector<LoopCheck> loops;  // places that looked like older ones
   int num_places = 0;            // that were remembered
+  // With features kept: described corners of the places that looked like others but are not known
+  // to be the same, and of those around them.
+  std::map<FrameId, Features> places;
   OdometrySeconds seconds;
   LoopSeconds loop_seconds;
   double global_averaging_seconds = 0.0;

@@ -6,6 +6,7 @@
 #include "apps/command.h"
 #include "apps/input.h"
 #include "ba/bundle_adjustment.h"
+#include "ba/relocalisation.h"
 #include "ba/resection.h"
 #include "krot/held_stretches.h"
 #include "krot/known_rotation.h"
@@ -28,6 +29,7 @@ struct PipelineOptions {
   KrotOptions krot;
   BundleOptions ba;
   CompletionOptions completion;
+  RelocalisationOptions relocalisation;
   ResectionOptions resection;
   // Points whose rays meet at less than this stay out of the cloud: their depth is noise.
   double cloud_min_angle_deg = 2.0;
@@ -45,6 +47,7 @@ struct PipelineOptions {
     visit("krot", krot);
     visit("ba", ba);
     visit("completion", completion);
+    visit("relocalisation", relocalisation);
     visit("resection", resection);
     visit("cloud_min_angle_deg", cloud_min_angle_deg);
     visit("cloud_outliers", cloud_outliers);

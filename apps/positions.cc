@@ -12,6 +12,7 @@
 #include "output/cloud_outliers.h"
 #include "rotodom/averaging/anchors.h"
 #include "rotodom/completion/completion.h"
+#include "rotodom/types/similarity.h"
 
 namespace rotslam {
 namespace {
@@ -25,22 +26,11 @@ std::set<FrameId> AllFrames(const RotationMap& rotations) {
   return frames;
 }
 
-// x_new = scale * turn * x_old + shift.
-struct Similarity {
-  double scale = 1.0;
-  Rotation turn;
-  Eigen::Vector3d shift = Eigen::Vector3d::Zero();
-};
-
 Reconstruction Moved(const Reconstruction& part, const Similarity& similarity) {
-  const auto move = [&](const Eigen::Vector3d& position) -> Eigen::Vector3d {
-    return similarity.scale * (similarity.turn * position) + similarity.shift;
-  };
   Reconstruction moved = part;
-  for (auto& [frame, rotation] : moved.cam_from_world)
-    rotation = rotation * similarity.turn.Inverse();
-  for (auto& [frame, center] : moved.center_in_world) center = move(center);
-  for (auto& [track, point] : moved.point_in_world) point = move(point);
+  for (auto& [frame, rotation] : moved.cam_from_world) rotation = similarity.Move(rotation);
+  for (auto& [frame, center] : moved.center_in_world) center = similarity.Move(center);
+  for (auto& [track, point] : moved.point_in_world) point = similarity.Move(point);
   return moved;
 }
 
@@ -215,6 +205,40 @@ TrackCompletion CompletionWith(const Input& input,
   };
 }
 
+// Moves keyframes to where others that look alike say that they are, as long as that makes the map
+// explain more; how many.
+int Mend(const Orientations& orientations,
+         const std::vector<Track>& tracks,
+         const std::vector<HeldStretch>& held,
+         const PipelineOptions& options,
+         const BundleOptions& bundle_options,
+         const TrackCompletion& complete,
+         RefinedComponents& refined) {
+  // Where some stand right, others are seen to stand wrong.
+  constexpr int kMaxPasses = 3;
+  if (!options.relocalisation.enabled) return 0;
+  std::vector<Lookalike> lookalikes;
+  for (const LoopCheck& check : orientations.loops)
+    lookalikes.push_back({check.frame, check.match});
+  int num_moved = 0;
+  const std::vector<Track> seen = WithBearingsOf(refined.camera, tracks);
+  for (int pass = 0; pass < kMaxPasses; ++pass) {
+    std::vector<const Reconstruction*> maps;
+    for (const BundleResult& bundle : refined.bundles) maps.push_back(&bundle.reconstruction);
+    const std::vector<RelocalisedMap> changed = Relocalise(maps,
+                                                           seen,
+                                                           orientations.places,
+                                                           lookalikes,
+                                                           refined.camera,
+                                                           options.relocalisation,
+                                                           bundle_options.num_threads);
+    const int count = RefineRelocalised(changed, seen, held, bundle_options, complete, refined);
+    num_moved += count;
+    if (count == 0) break;
+  }
+  return num_moved;
+}
+
 // FindKeyframePositions from the tracks of all frames.
 // @param complete  may be null.
 PositionResult MapKeyframes(const Orientations& orientations,
@@ -287,6 +311,8 @@ PositionResult MapKeyframes(const Orientations& orientations,
   progress.StartStage("bundle adjustment", -1);
   RefinedComponents refined = RefineComponents(
       keyframe_rotations, result.krot, tracks, result.held, camera, bundle_options, complete);
+  result.num_relocalised =
+      Mend(orientations, tracks, result.held, options, bundle_options, complete, refined);
   result.camera = refined.camera;
   for (std::size_t k = 0; k < refined.components.size(); ++k) {
     MapComponent& component = refined.components[k];
@@ -317,6 +343,10 @@ PositionResult MapKeyframes(const Orientations& orientations,
   }
   progress.EndStage(std::to_string(result.map.point_in_world.size()) + " points, " +
                     DescribeMeanError(result.bundles) + ", " + DescribeRounded(result.camera));
+  if (result.num_relocalised > 0) {
+    progress.Say("keyframes found again in another place of the map: " +
+                 std::to_string(result.num_relocalised));
+  }
   if (auto turning = find_turning()) return *std::move(turning);
 
   return result;

@@ -29,10 +29,10 @@ std::vector<MapComponent> ComponentsOf(const KrotSolution& krot) {
   return components;
 }
 
-// Bundle adjustment of one component, in its own scale.
+// Bundle adjustment of one component, in its own scale, from poses of all its keyframes.
 BundleResult RefineComponent(const MapComponent& component,
-                             const RotationMap& rotations,
-                             const KrotSolution& krot,
+                             const RotationMap& cam_from_world,
+                             const CenterMap& center_in_world,
                              const std::vector<Track>& tracks,
                              const std::vector<HeldStretch>& held,
                              const Camera& camera,
@@ -41,8 +41,8 @@ BundleResult RefineComponent(const MapComponent& component,
   BundleProblem problem;
   problem.camera = camera;
   for (const FrameId frame : component.keyframes) {
-    problem.start.cam_from_world[frame] = rotations.at(frame);
-    problem.start.center_in_world[frame] = krot.center_in_world.at(frame);
+    problem.start.cam_from_world[frame] = cam_from_world.at(frame);
+    problem.start.center_in_world[frame] = center_in_world.at(frame);
   }
   for (const HeldStretch& stretch : held) {
     if (component.keyframes.contains(stretch.first) && component.keyframes.contains(stretch.last)) {
@@ -70,6 +70,49 @@ std::size_t LargestComponent(const std::vector<MapComponent>& components,
     largest = k;
   }
   return largest;
+}
+
+// The tracks with observations more.
+std::vector<Track> WithSightings(const std::vector<std::pair<TrackId, Observation>>& sightings,
+                                 std::vector<Track> tracks) {
+  std::map<TrackId, std::map<FrameId, Observation>> added;
+  for (const auto& [track, observation] : sightings) {
+    added[track].try_emplace(observation.frame, observation);
+  }
+  for (Track& track : tracks) {
+    const auto more = added.find(track.id);
+    if (more == added.end()) continue;
+    for (const Observation& observation : track.observations) {
+      more->second.insert_or_assign(observation.frame, observation);
+    }
+    track.observations.clear();
+    for (const auto& [frame, observation] : more->second) track.observations.push_back(observation);
+  }
+  return tracks;
+}
+
+// Of those in `parts`, the one with the most observations.
+int LargestOf(const std::set<int>& parts, const RefinedComponents& refined) {
+  return *std::max_element(parts.begin(), parts.end(), [&](int a, int b) {
+    return refined.bundles[a].summary.num_observations <
+           refined.bundles[b].summary.num_observations;
+  });
+}
+
+// Whether the map that takes their place sees more of the images than the parts do. Of what the
+// parts see it may lose a little: where they have become one, their scales are one.
+bool ExplainsMore(const BundleResult& bundle,
+                  const std::set<int>& parts,
+                  const RefinedComponents& refined) {
+  constexpr double kMaxLoss = 0.01;
+  int num_observations = 0;
+  int num_supporting = 0;
+  for (const int part : parts) {
+    num_observations += refined.bundles[part].summary.num_observations;
+    num_supporting += refined.bundles[part].summary.support.num_observations;
+  }
+  return bundle.Usable() && bundle.summary.num_observations > num_observations &&
+         bundle.summary.support.num_observations >= (1.0 - kMaxLoss) * num_supporting;
 }
 
 }  // namespace
@@ -100,7 +143,7 @@ RefinedComponents RefineComponents(const RotationMap& cam_from_world,
       [&](std::size_t k, const std::vector<Track>& seen, const BundleOptions& bundle_options) {
         refined.bundles[k] = RefineComponent(refined.components[k],
                                              cam_from_world,
-                                             krot,
+                                             krot.center_in_world,
                                              seen,
                                              held,
                                              refined.camera,
@@ -119,6 +162,47 @@ RefinedComponents RefineComponents(const RotationMap& cam_from_world,
     if (k != first) refine(k, seen, same_lens);
   }
   return refined;
+}
+
+int RefineRelocalised(const std::vector<RelocalisedMap>& maps,
+                      const std::vector<Track>& tracks,
+                      const std::vector<HeldStretch>& held,
+                      BundleOptions options,
+                      const TrackCompletion& complete,
+                      RefinedComponents& refined) {
+  options.bridge.enabled = false;
+  options.lens.refine_focal = options.lens.refine_distortion = false;
+  options.lens.refine_principal_point = false;
+  int num_moved = 0;
+  std::set<int> replaced;
+  for (const RelocalisedMap& map : maps) {
+    MapComponent component;
+    for (const auto& [frame, center] : map.center_in_world) component.keyframes.insert(frame);
+    BundleResult bundle = RefineComponent(component,
+                                          map.cam_from_world,
+                                          map.center_in_world,
+                                          WithSightings(map.sightings, tracks),
+                                          held,
+                                          refined.camera,
+                                          options,
+                                          complete);
+    if (!ExplainsMore(bundle, map.parts, refined)) continue;
+    num_moved += map.num_moved;
+    const int largest = LargestOf(map.parts, refined);
+    const BundleSummary& before = refined.bundles[largest].summary;
+    bundle.summary.lens_gain = before.lens_gain;
+    bundle.summary.lens_refined = before.lens_refined;
+    bundle.summary.lens_sigmas = before.lens_sigmas;
+    refined.bundles[largest] = std::move(bundle);
+    refined.components[largest] = std::move(component);
+    replaced.insert(map.parts.begin(), map.parts.end());
+    replaced.erase(largest);
+  }
+  for (auto part = replaced.rbegin(); part != replaced.rend(); ++part) {
+    refined.bundles.erase(refined.bundles.begin() + *part);
+    refined.components.erase(refined.components.begin() + *part);
+  }
+  return num_moved;
 }
 
 double MeanErrorPx(const std::vector<BundleSummary>& bundles) {

@@ -18,7 +18,7 @@ using RowMatrix = Eigen::Matrix<double, 2, Cols, Eigen::RowMajor>;
 
 // `Cols` columns of a Jacobian block that is `stride` wide.
 template <int Cols>
-Eigen::Map<RowMatrix<Cols>, 0, Eigen::OuterStride<>> Columns(double* data, int stride) {
+Eigen::Map<RowMatrix<Cols>, 0, Eigen::OuterStride<>> ColumnsOf(double* data, int stride) {
   return Eigen::Map<RowMatrix<Cols>, 0, Eigen::OuterStride<>>(data, Eigen::OuterStride<>(stride));
 }
 
@@ -160,15 +160,15 @@ bool ReprojectionCost::Evaluate(double const* const* parameters,
   const Eigen::Matrix2d weight = robust.weight / sigma_px_;
   if (blocks.J_turn != nullptr) {
     const Eigen::Matrix<double, 2, 3> J_turn = J.by_rotation * rotation_.Jacobian();
-    Columns<3>(blocks.J_turn, blocks.camera_stride).noalias() = weight * J_turn;
+    ColumnsOf<3>(blocks.J_turn, blocks.camera_stride).noalias() = weight * J_turn;
   }
   if (blocks.J_center != nullptr) {
     if (form_.at_infinity) J.by_center.setZero();
-    Columns<3>(blocks.J_center, blocks.camera_stride).noalias() = weight * J.by_center;
+    ColumnsOf<3>(blocks.J_center, blocks.camera_stride).noalias() = weight * J.by_center;
   }
-  if (blocks.J_point != nullptr) Columns<3>(blocks.J_point, 3).noalias() = weight * J.by_point;
+  if (blocks.J_point != nullptr) ColumnsOf<3>(blocks.J_point, 3).noalias() = weight * J.by_point;
   if (blocks.J_lens != nullptr) {
-    auto J_lens = Columns<6>(blocks.J_lens, 6);
+    auto J_lens = ColumnsOf<6>(blocks.J_lens, 6);
     if (pixel) {
       J_lens.noalias() =
           weight *

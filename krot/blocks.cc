@@ -9,7 +9,7 @@
 
 #include <Eigen/Cholesky>
 
-#include "krot/draw.h"
+#include "rotodom/types/draw.h"
 #include "rotodom/types/disjoint_sets.h"
 #include "rotodom/types/median.h"
 

@@ -5,7 +5,7 @@
 
 #include <Eigen/Dense>
 
-#include "krot/draw.h"
+#include "rotodom/types/draw.h"
 #include "rotodom/types/triangulation.h"
 
 namespace rotslam {

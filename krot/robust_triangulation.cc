@@ -1,6 +1,6 @@
 #include "krot/robust_triangulation.h"
 
-#include "krot/draw.h"
+#include "rotodom/types/draw.h"
 
 namespace rotslam {
 namespace {

@@ -6,7 +6,7 @@
 
 #include <Eigen/Dense>
 
-#include "krot/draw.h"
+#include "rotodom/types/draw.h"
 
 namespace rotslam {
 namespace {

@@ -176,6 +176,13 @@ void LoopClosure::Remember(Place place, const LoopReport& report) {
   places_.emplace(frame, std::move(place));
 }
 
+std::map<FrameId, Features> LoopClosure::TakePlaces() {
+  std::map<FrameId, Features> corners;
+  for (auto& [frame, place] : places_) corners.emplace(frame, std::move(place.corners));
+  places_.clear();
+  return corners;
+}
+
 bool LoopClosure::IsNewPlace(const FrameEstimate& estimate) const {
   const Features& features = estimate.features;
   if (features.size() < options_.verification.min_inliers) return false;

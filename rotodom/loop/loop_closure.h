@@ -126,6 +126,9 @@ class LoopClosure {
               const LoopReport& report,
               const RotationMap& cam_from_world);
 
+  /// Described corners of all places, which are forgotten.
+  std::map<FrameId, Features> TakePlaces();
+
   int num_places() const { return static_cast<int>(places_.size()); }
   const LoopSeconds& seconds() const { return seconds_; }
 

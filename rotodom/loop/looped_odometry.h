@@ -71,6 +71,9 @@ class LoopedOdometry {
   const OdometrySeconds& odometry_seconds() const { return odometry_.seconds(); }
   LoopSeconds loop_seconds() const { return closure_ ? closure_->seconds() : LoopSeconds{}; }
   double averaging_seconds() const { return orientations_.averaging_seconds(); }
+  std::map<FrameId, Features> TakePlaces() {
+    return closure_ ? closure_->TakePlaces() : std::map<FrameId, Features>();
+  }
   int num_places() const { return closure_ ? closure_->num_places() : 0; }
 
  private:

@@ -76,6 +76,72 @@ TEST(Chain, ThreeStartsEndInOneMinimum) {
   }
 }
 
+// A street whose last views do not know the tracks of those before: two components.
+class TwoComponents : public testing::Test {
+ protected:
+  static constexpr int kFirstLate = 20;
+  static constexpr int kLateIds = 100000;
+
+  TwoComponents() : scene_(MakeScene(Street())) {
+    for (const Track& track : scene_.tracks) {
+      Track early = track;
+      Track late = track;
+      late.id.value += kLateIds;
+      const auto is_late = [](const Observation& seen) { return seen.frame.value >= kFirstLate; };
+      std::erase_if(early.observations, is_late);
+      std::erase_if(late.observations, [&](const Observation& seen) { return !is_late(seen); });
+      for (const Observation& seen : late.observations) {
+        if (early.observations.size() >= 2) common_.emplace_back(track.id, seen);
+      }
+      if (early.observations.size() >= 2) tracks_.push_back(early);
+      if (late.observations.size() >= 2) tracks_.push_back(late);
+    }
+    const KrotSolution krot =
+        SolveKnownRotation(scene_.cam_from_world, tracks_, scene_.camera, KrotOptions());
+    refined_ = RefineComponents(scene_.cam_from_world, krot, tracks_, {}, scene_.camera, {});
+  }
+
+  // The late views as far away as that.
+  RelocalisedMap WholeMap(const Eigen::Vector3d& away) const {
+    RelocalisedMap map;
+    map.parts = {0, 1};
+    map.cam_from_world = scene_.cam_from_world;
+    map.center_in_world = scene_.true_center_in_world;
+    for (auto& [frame, center] : map.center_in_world) {
+      if (frame.value >= kFirstLate) center += away;
+    }
+    map.sightings = common_;
+    map.num_moved = static_cast<int>(map.center_in_world.size()) - kFirstLate;
+    return map;
+  }
+
+  Scene scene_;
+  std::vector<Track> tracks_;
+  std::vector<std::pair<TrackId, Observation>> common_;  // of early tracks, in late views
+  RefinedComponents refined_;
+};
+
+TEST_F(TwoComponents, BecomeOneThatExplainsMore) {
+  ASSERT_EQ(refined_.components.size(), 2U);
+  const int num_moved =
+      RefineRelocalised({WholeMap({0.3, 0.0, 0.2})}, tracks_, {}, {}, nullptr, refined_);
+  EXPECT_EQ(num_moved, 10);
+  ASSERT_EQ(refined_.components.size(), 1U);
+  ASSERT_EQ(refined_.bundles.size(), 1U);
+  EXPECT_EQ(refined_.components[0].keyframes.size(), 30U);
+  EXPECT_LT(ErrorOf(refined_.bundles[0], scene_), 2.0 * ErrorOf(SolveChain(scene_, "l1"), scene_));
+}
+
+TEST_F(TwoComponents, StayWhereTheOneExplainsLess) {
+  RelocalisedMap wrong = WholeMap({0.0, 0.0, 0.0});
+  for (auto& [frame, rotation] : wrong.cam_from_world) {
+    if (frame.value >= kFirstLate) rotation = Rotation::Exp({0.0, 0.05 * frame.value, 0.0});
+  }
+  EXPECT_EQ(RefineRelocalised({wrong}, tracks_, {}, {}, nullptr, refined_), 0);
+  EXPECT_EQ(refined_.components.size(), 2U);
+  EXPECT_EQ(refined_.bundles.size(), 2U);
+}
+
 struct Kept {
   double outliers = 0.0;  // shares
   double inliers = 0.0;

@@ -42,8 +42,8 @@ Similarity AlignCenters(const CenterMap& estimate, const CenterMap& truth) {
   const Eigen::Matrix4d T = Eigen::umeyama(pairs.estimate, pairs.truth, true);
   Similarity similarity;
   similarity.scale = std::cbrt(T.topLeftCorner<3, 3>().determinant());
-  similarity.rotation = Rotation::FromMatrix(T.topLeftCorner<3, 3>() / similarity.scale);
-  similarity.translation = T.topRightCorner<3, 1>();
+  similarity.turn = Rotation::FromMatrix(T.topLeftCorner<3, 3>() / similarity.scale);
+  similarity.shift = T.topRightCorner<3, 1>();
   return similarity;
 }
 
@@ -56,7 +56,7 @@ Similarity AlignCentersKnownRotation(const CenterMap& estimate, const CenterMap&
   pairs.truth.colwise() -= mean_truth;
   Similarity similarity;
   similarity.scale = pairs.estimate.cwiseProduct(pairs.truth).sum() / pairs.estimate.squaredNorm();
-  similarity.translation = mean_truth - similarity.scale * mean_estimate;
+  similarity.shift = mean_truth - similarity.scale * mean_estimate;
   return similarity;
 }
 
@@ -68,7 +68,7 @@ CenterError CompareCenters(const CenterMap& estimate,
   for (const auto& [frame, center] : estimate) {
     const auto entry = truth.find(frame);
     if (entry == truth.end()) continue;
-    const double distance = (truth_from_estimate * center - entry->second).norm();
+    const double distance = (truth_from_estimate.Move(center) - entry->second).norm();
     error.max = std::max(error.max, distance);
     sum += distance * distance;
     ++error.count;
@@ -84,7 +84,7 @@ double MaxPointError(const PointMap& estimate,
   for (const auto& [track, point] : estimate) {
     const auto entry = truth.find(track);
     if (entry == truth.end()) continue;
-    largest = std::max(largest, (truth_from_estimate * point - entry->second).norm());
+    largest = std::max(largest, (truth_from_estimate.Move(point) - entry->second).norm());
   }
   return largest;
 }

@@ -1,18 +1,9 @@
 #pragma once
 
 #include "rotodom/types/maps.h"
+#include "rotodom/types/similarity.h"
 
 namespace rotslam {
-
-/// x -> scale * R x + translation.
-struct Similarity {
-  double scale = 1.0;
-  Rotation rotation;
-  Eigen::Vector3d translation = Eigen::Vector3d::Zero();
-  Eigen::Vector3d operator*(const Eigen::Vector3d& point) const {
-    return scale * (rotation * point) + translation;
-  }
-};
 
 /// Least-squares similarity taking `estimate` onto `truth` over the frames in both (Umeyama 1991).
 /// Throws std::invalid_argument for fewer than three shared frames.

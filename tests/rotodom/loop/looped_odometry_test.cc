@@ -233,6 +233,22 @@ TEST(LoopedOdometry, IsTheOdometryWhereNothingComesBack) {
   ExpectSameBytes(run.result.cam_from_world, PlainOdometry(images));
 }
 
+TEST(LoopedOdometry, GivesAwayThePlacesThatItRemembers) {
+  LoopedOdometry odometry(SmallCamera(), FewFeatures(), {}, nullptr, true, 1, 1);
+  for (int k = 0; k < 10; ++k) odometry.AddFrame(FrameId{k}, k / kFps, Images()[k]);
+  odometry.Finish();
+  const int num_places = odometry.num_places();
+  const std::map<FrameId, Features> places = odometry.TakePlaces();
+  EXPECT_GT(num_places, 1);
+  EXPECT_EQ(static_cast<int>(places.size()), num_places);
+  for (const auto& [frame, corners] : places) {
+    EXPECT_EQ(corners.frame, frame);
+    EXPECT_GT(corners.size(), 100);
+    EXPECT_EQ(corners.descriptors.rows, corners.size());
+  }
+  EXPECT_TRUE(odometry.TakePlaces().empty());
+}
+
 TEST(LoopedOdometry, IsTheOdometryWithoutLoops) {
   const LoopedRun run = Follow(Images(), FewFeatures(), WithoutLoops());
   EXPECT_EQ(run.num_places, 0);
