@@ -99,20 +99,17 @@ int LargestOf(const std::set<int>& parts, const RefinedComponents& refined) {
   });
 }
 
-// Whether the map that takes their place sees more of the images than the parts do. Of what the
-// parts see it may lose a little: where they have become one, their scales are one.
+// Whether the map that takes their place explains more than the parts do: of all that is seen now,
+// and of what the tracker saw, so that what is found new counts once and what is lost twice.
 bool ExplainsMore(const BundleResult& bundle,
                   const std::set<int>& parts,
                   const RefinedComponents& refined) {
-  constexpr double kMaxLoss = 0.01;
-  int num_observations = 0;
-  int num_supporting = 0;
-  for (const int part : parts) {
-    num_observations += refined.bundles[part].summary.num_observations;
-    num_supporting += refined.bundles[part].summary.support.num_observations;
-  }
-  return bundle.Usable() && bundle.summary.num_observations > num_observations &&
-         bundle.summary.support.num_observations >= (1.0 - kMaxLoss) * num_supporting;
+  const auto explained = [](const BundleSummary& summary) {
+    return summary.num_observations + summary.support.num_observations;
+  };
+  int num_explained = 0;
+  for (const int part : parts) num_explained += explained(refined.bundles[part].summary);
+  return bundle.Usable() && explained(bundle.summary) > num_explained;
 }
 
 }  // namespace

@@ -198,6 +198,7 @@ std::optional<FoundFrame> FrameFinder::FindPose(FrameId frame,
   if (MapOf(frame) == map) Compare(points, sightings, *pose, found);
   found.is_displaced = found.num_present + options_.min_gain_sigmas * std::sqrt(pose->num_inliers) <
                        pose->num_inliers;
+  found.is_right = found.is_right && !found.is_displaced;
   if (found.is_displaced) Describe(*pose, points, sightings, found);
   return found;
 }
