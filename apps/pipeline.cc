@@ -15,6 +15,7 @@ std::optional<std::string> PipelineOptions::Problem() const {
   if (auto problem = ProblemIn("krot", krot)) return problem;
   if (auto problem = ProblemIn("ba", ba)) return problem;
   if (auto problem = ProblemIn("completion", completion)) return problem;
+  if (auto problem = ProblemIn("relocalisation", relocalisation)) return problem;
   if (auto problem = ProblemIn("resection", resection)) return problem;
   if (!(cloud_min_angle_deg >= 0.0)) {
     return OutOfRange("cloud_min_angle_deg", cloud_min_angle_deg, "zero or more");

@@ -5,8 +5,8 @@
 
 #include "apps/command.h"
 #include "apps/input.h"
+#include "apps/relocalisation.h"
 #include "ba/bundle_adjustment.h"
-#include "ba/relocalisation.h"
 #include "ba/resection.h"
 #include "krot/held_stretches.h"
 #include "krot/known_rotation.h"

@@ -4,8 +4,8 @@
 #include <string>
 #include <vector>
 
+#include "apps/relocalisation.h"
 #include "ba/bundle_adjustment.h"
-#include "ba/relocalisation.h"
 #include "krot/known_rotation.h"
 #include "rotodom/types/held_stretch.h"
 

@@ -5,13 +5,13 @@
 #include <utility>
 #include <vector>
 
-#include "ba/relocalisation.h"
+#include "apps/relocalisation.h"
 #include "ba/resection.h"
 #include "rotodom/types/similarity.h"
 
 namespace rotslam {
 
-// Poses of a map's frames, found anew. Not for callers of ba.
+// Poses of a map's frames, found anew. Relocalise's own.
 
 // A point, and where a frame shows it or seems to.
 struct Sighted {

@@ -1,11 +1,11 @@
-#include "ba/relocalisation.h"
+#include "apps/relocalisation.h"
 
 #include <algorithm>
 #include <iterator>
 #include <stdexcept>
 #include <utility>
 
-#include "ba/frame_finder.h"
+#include "apps/frame_finder.h"
 #include "rotodom/types/options.h"
 #include "rotodom/types/parallel.h"
 

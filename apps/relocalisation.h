@@ -62,7 +62,7 @@ struct RelocalisedMap {
 /// @param places  described corners of frames, where a global shutter would see them.
 /// @return  the maps that change; the same at any `num_threads`. Throws std::invalid_argument when
 /// an option is out of range.
-/// Error:   to a few hundredths of the distance to the points (ba tests).
+/// Error:   to a few hundredths of the distance to the points (relocalisation tests).
 /// Cost:    20 ms for each pair that looks alike, 100 ms for one that has to ask neighbours.
 /// Source:  as Mur-Artal and Tardos, ORB-SLAM2, 2017, sec. III-E, relocalise a lost camera; whom to
 /// believe is ours.

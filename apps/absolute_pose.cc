@@ -1,4 +1,4 @@
-#include "ba/absolute_pose.h"
+#include "apps/absolute_pose.h"
 
 #include <algorithm>
 #include <array>

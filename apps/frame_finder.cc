@@ -1,11 +1,11 @@
-#include "ba/frame_finder.h"
+#include "apps/frame_finder.h"
 
 #include <algorithm>
 #include <cmath>
 #include <cstdint>
 #include <iterator>
 
-#include "ba/absolute_pose.h"
+#include "apps/absolute_pose.h"
 #include "rotodom/matching/matching.h"
 #include "rotodom/types/median.h"
 

@@ -1,4 +1,4 @@
-#include "ba/relocalisation.h"
+#include "apps/relocalisation.h"
 
 #include <algorithm>
 #include <random>
