@@ -54,6 +54,7 @@ std::vector<FoundFrame> FindAllByTracks(const FrameFinder& finder,
                                         int num_threads) {
   std::map<FrameId, std::vector<Sighted>> known = finder.PointsOfTracks(tracks);
   std::vector<FrameId> frames;
+  frames.reserve(known.size());
   for (const auto& [frame, points] : known) frames.push_back(frame);
   std::vector<std::optional<FoundFrame>> found(frames.size());
   ParallelFor(static_cast<int>(frames.size()), num_threads, [&](int k) {
