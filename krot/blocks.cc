@@ -9,8 +9,8 @@
 
 #include <Eigen/Cholesky>
 
-#include "rotodom/types/draw.h"
 #include "rotodom/types/disjoint_sets.h"
+#include "rotodom/types/draw.h"
 #include "rotodom/types/median.h"
 
 namespace rotslam {
