@@ -7,6 +7,7 @@
 
 #include "apps/absolute_pose.h"
 #include "rotodom/matching/matching.h"
+#include "rotodom/tracking/view.h"
 #include "rotodom/types/median.h"
 
 namespace rotslam {
@@ -41,12 +42,7 @@ FrameFinder::FrameFinder(const std::vector<const Reconstruction*>& maps,
 
 int FrameFinder::CountCommon(FrameId a, FrameId b) const {
   if (MapOf(a) != MapOf(b)) return 0;
-  const std::vector<TrackId>& of_a = PointsOf(a);
-  const std::vector<TrackId>& of_b = PointsOf(b);
-  std::vector<TrackId> common;
-  std::set_intersection(
-      of_a.begin(), of_a.end(), of_b.begin(), of_b.end(), std::back_inserter(common));
-  return static_cast<int>(common.size());
+  return CountCommonTracks(PointsOf(a), PointsOf(b));
 }
 
 std::map<FrameId, std::vector<Sighted>> FrameFinder::PointsOfTracks(
@@ -90,9 +86,11 @@ std::optional<FoundFrame> FrameFinder::Find(const Lookalike& pair) const {
   std::optional<FoundFrame> found = FindPose(pair.frame, MapOf(pair.match), recognised);
   const bool alone = found && (found->is_displaced || found->is_right);
   if (!alone) {
+    const std::size_t num_of_match = recognised.size();
     for (const FrameId neighbour : NeighboursOf(pair.match)) {
       if (neighbour != pair.frame) Recognise(pair.frame, neighbour, recognised);
     }
+    if (recognised.size() == num_of_match) return std::nullopt;
     found = FindPose(pair.frame, MapOf(pair.match), recognised);
   }
   if (!found || !(found->is_displaced || found->is_right)) return std::nullopt;

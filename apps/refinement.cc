@@ -5,6 +5,7 @@
 #include <cstdint>
 #include <cstdio>
 #include <cstdlib>
+#include <iterator>
 #include <map>
 #include <utility>
 
@@ -185,15 +186,15 @@ int RefineRelocalised(const std::vector<RelocalisedMap>& maps,
                                           complete);
     if (!ExplainsMore(bundle, map.parts, refined)) continue;
     num_moved += map.num_moved;
-    const int largest = LargestOf(map.parts, refined);
-    const BundleSummary& before = refined.bundles[largest].summary;
+    const BundleSummary& before = refined.bundles[LargestOf(map.parts, refined)].summary;
     bundle.summary.lens_gain = before.lens_gain;
     bundle.summary.lens_refined = before.lens_refined;
     bundle.summary.lens_sigmas = before.lens_sigmas;
-    refined.bundles[largest] = std::move(bundle);
-    refined.components[largest] = std::move(component);
-    replaced.insert(map.parts.begin(), map.parts.end());
-    replaced.erase(largest);
+    // Components go by their first keyframe.
+    const int first = *map.parts.begin();
+    refined.bundles[first] = std::move(bundle);
+    refined.components[first] = std::move(component);
+    replaced.insert(std::next(map.parts.begin()), map.parts.end());
   }
   for (auto part = replaced.rbegin(); part != replaced.rend(); ++part) {
     refined.bundles.erase(refined.bundles.begin() + *part);

@@ -9,9 +9,12 @@ namespace rotslam {
 namespace {
 
 // In a world turned around, so that nothing near the origin sees the points.
-View MakeTurnedView(CameraModel model, int num_points, double noise_px, double outlier_ratio) {
+SeenPoints MakeTurnedView(CameraModel model,
+                          int num_points,
+                          double noise_px,
+                          double outlier_ratio) {
   const Similarity turn = {1.0, Rotation::Exp({0.3, 2.6, 0.4}), {30.0, 5.0, -20.0}};
-  View view = MakeView(model, num_points, noise_px, outlier_ratio);
+  SeenPoints view = MakeView(model, num_points, noise_px, outlier_ratio);
   view.cam_from_world = turn.Move(view.cam_from_world);
   view.center_in_world = turn.Move(view.center_in_world);
   for (PointSighting& sighting : view.sightings) {
@@ -28,7 +31,7 @@ INSTANTIATE_TEST_SUITE_P(Models,
                                            CameraModel::kEquidistant));
 
 TEST_P(AbsolutePoseForEveryCamera, CleanSightingsGiveTheTruth) {
-  const View view = MakeTurnedView(GetParam(), 100, 0.0, 0.0);
+  const SeenPoints view = MakeTurnedView(GetParam(), 100, 0.0, 0.0);
   const auto pose = FindAbsolutePose(view.camera, view.sightings, {}, 1);
   ASSERT_TRUE(pose);
   EXPECT_LT(AngleErrorDeg(*pose, view), 1e-8);
@@ -38,7 +41,7 @@ TEST_P(AbsolutePoseForEveryCamera, CleanSightingsGiveTheTruth) {
 
 TEST(FindAbsolutePose, EightOfTenMayBeWrong) {
   for (const std::uint64_t seed : {1, 2, 3}) {
-    const View view = MakeTurnedView(CameraModel::kPinhole, 400, 0.5, 0.8);
+    const SeenPoints view = MakeTurnedView(CameraModel::kPinhole, 400, 0.5, 0.8);
     const auto pose = FindAbsolutePose(view.camera, view.sightings, {}, seed);
     ASSERT_TRUE(pose);
     EXPECT_NEAR(pose->num_inliers, 80, 15);
@@ -48,9 +51,9 @@ TEST(FindAbsolutePose, EightOfTenMayBeWrong) {
 }
 
 TEST(FindAbsolutePose, FindsNoneInChance) {
-  const View view = MakeTurnedView(CameraModel::kPinhole, 400, 0.5, 1.0);
+  const SeenPoints view = MakeTurnedView(CameraModel::kPinhole, 400, 0.5, 1.0);
   EXPECT_FALSE(FindAbsolutePose(view.camera, view.sightings, {.min_inliers = 20}, 1));
-  const View few = MakeTurnedView(CameraModel::kPinhole, 9, 0.5, 0.0);
+  const SeenPoints few = MakeTurnedView(CameraModel::kPinhole, 9, 0.5, 0.0);
   EXPECT_FALSE(FindAbsolutePose(few.camera, few.sightings, {}, 1));
 }
 

@@ -7,7 +7,7 @@
 namespace rotslam {
 namespace {
 
-ResectionStart NearStart(const View& view, double angle_deg, double offset) {
+ResectionStart NearStart(const SeenPoints& view, double angle_deg, double offset) {
   ResectionStart start;
   start.cam_from_world =
       Rotation::Exp(angle_deg * kRadFromDeg * Eigen::Vector3d(0.6, -0.64, 0.48)) *
@@ -24,7 +24,7 @@ INSTANTIATE_TEST_SUITE_P(Models,
                                            CameraModel::kEquidistant));
 
 TEST_P(ResectionForEveryCamera, CleanSightingsGiveTheTruth) {
-  const View view = MakeView(GetParam(), 100, 0.0, 0.0);
+  const SeenPoints view = MakeView(GetParam(), 100, 0.0, 0.0);
   const auto pose = ResectFrame(view.camera, view.sightings, NearStart(view, 2.0, 0.8), {});
   ASSERT_TRUE(pose);
   EXPECT_LT(AngleErrorDeg(*pose, view), 1e-8);
@@ -33,7 +33,7 @@ TEST_P(ResectionForEveryCamera, CleanSightingsGiveTheTruth) {
 }
 
 // Squared error in units of the covariance: 6 on average, above 22.5 once in a thousand.
-double SquaredMahalanobis(const ResectedPose& pose, const View& view) {
+double SquaredMahalanobis(const ResectedPose& pose, const SeenPoints& view) {
   Eigen::Matrix<double, 6, 1> error;
   error << (pose.cam_from_world * view.cam_from_world.Inverse()).Log(),
       pose.center_in_world - view.center_in_world;
@@ -42,7 +42,7 @@ double SquaredMahalanobis(const ResectedPose& pose, const View& view) {
 
 TEST(ResectFrame, ThirtyPercentOutliersDoNoHarm) {
   for (const double offset : {0.1, 0.5, 2.0}) {
-    const View view = MakeView(CameraModel::kPinhole, 500, 0.5, 0.3);
+    const SeenPoints view = MakeView(CameraModel::kPinhole, 500, 0.5, 0.3);
     const auto pose = ResectFrame(view.camera, view.sightings, NearStart(view, 1.0, offset), {});
     ASSERT_TRUE(pose);
     EXPECT_NEAR(pose->num_inliers, 350, 30);
@@ -52,7 +52,7 @@ TEST(ResectFrame, ThirtyPercentOutliersDoNoHarm) {
 
 TEST(ResectFrame, CovarianceTellsTheErrorToExpect) {
   // Mean of the squared error in its own covariance's unit, over 100 draws of noise: 6 unknowns.
-  View view = MakeView(CameraModel::kPinhole, 200, 0.0, 0.0);
+  SeenPoints view = MakeView(CameraModel::kPinhole, 200, 0.0, 0.0);
   const std::vector<PointSighting> clean = view.sightings;
   std::mt19937 random(3);
   std::normal_distribution<double> normal(0.0, 0.5);
@@ -72,7 +72,7 @@ TEST(ResectFrame, CovarianceTellsTheErrorToExpect) {
 }
 
 TEST(ResectFrame, HoldsWhatItIsToldTo) {
-  const View view = MakeView(CameraModel::kPinhole, 100, 0.0, 0.0);
+  const SeenPoints view = MakeView(CameraModel::kPinhole, 100, 0.0, 0.0);
   ResectionStart start = NearStart(view, 0.0, 0.8);
   const auto centred = ResectFrame(view.camera, view.sightings, start, {.refine_rotation = false});
   ASSERT_TRUE(centred);
@@ -88,7 +88,7 @@ TEST(ResectFrame, HoldsWhatItIsToldTo) {
 }
 
 TEST(ResectFrame, ATightRotationPriorHoldsTheRotation) {
-  const View view = MakeView(CameraModel::kPinhole, 200, 0.5, 0.0);
+  const SeenPoints view = MakeView(CameraModel::kPinhole, 200, 0.5, 0.0);
   ResectionStart start = NearStart(view, 0.0, 0.3);
   const auto free = ResectFrame(view.camera, view.sightings, start, {});
   start.rotation_covariance = 1e-14 * Eigen::Matrix3d::Identity();
@@ -105,7 +105,7 @@ TEST(ResectFrame, ATightRotationPriorHoldsTheRotation) {
 }
 
 TEST(ResectFrame, SaysNoToTooLittle) {
-  const View view = MakeView(CameraModel::kPinhole, 100, 0.0, 0.0);
+  const SeenPoints view = MakeView(CameraModel::kPinhole, 100, 0.0, 0.0);
   const ResectionStart start = NearStart(view, 0.5, 0.2);
   EXPECT_FALSE(ResectFrame(view.camera, {}, start, {}));
   const std::vector<PointSighting> few(view.sightings.begin(), view.sightings.begin() + 9);

@@ -9,7 +9,7 @@
 namespace rotslam {
 
 /// A camera and points that it sees.
-struct View {
+struct SeenPoints {
   Camera camera;
   Rotation cam_from_world;
   Eigen::Vector3d center_in_world;
@@ -17,11 +17,14 @@ struct View {
 };
 
 /// @param outlier_ratio  of the sightings, anywhere in the image.
-inline View MakeView(CameraModel model, int num_points, double noise_px, double outlier_ratio) {
+inline SeenPoints MakeView(CameraModel model,
+                           int num_points,
+                           double noise_px,
+                           double outlier_ratio) {
   std::mt19937 random(7);
   std::normal_distribution<double> normal;
   std::uniform_real_distribution<double> uniform(0.0, 1.0);
-  View view;
+  SeenPoints view;
   view.camera = BaCamera(model);
   view.cam_from_world = Rotation::Exp({0.2, -0.7, 0.1});
   view.center_in_world = {3.0, -1.0, 12.0};
@@ -41,7 +44,7 @@ inline View MakeView(CameraModel model, int num_points, double noise_px, double 
   return view;
 }
 
-inline double AngleErrorDeg(const ResectedPose& pose, const View& view) {
+inline double AngleErrorDeg(const ResectedPose& pose, const SeenPoints& view) {
   return (pose.cam_from_world * view.cam_from_world.Inverse()).AngleDeg();
 }
 
