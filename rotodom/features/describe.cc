@@ -5,14 +5,13 @@
 
 #include <opencv2/core.hpp>
 
+#include "rotodom/features/binary_descriptor.h"
 #include "rotodom/features/features.h"
 #include "rotodom/features/orb_descriptor.h"
 #include "rotodom/types/parallel.h"
 
 namespace rotslam {
 namespace {
-
-constexpr int kDescriptorBytes = 32;
 
 // A copy of the pixels around a place, the image continued by its mirror image.
 template <int kBefore, int kSize>

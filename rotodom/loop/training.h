@@ -6,7 +6,7 @@
 #include <string>
 #include <vector>
 
-#include "rotodom/loop/binary_descriptor.h"
+#include "rotodom/features/binary_descriptor.h"
 #include "rotodom/loop/vocabulary.h"
 
 namespace rotslam {

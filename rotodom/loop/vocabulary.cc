@@ -3,7 +3,6 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <cstring>
 #include <limits>
 #include <numeric>
 #include <stdexcept>
@@ -126,18 +125,6 @@ DirectIndex IndexOf(std::span<const std::pair<std::uint32_t, std::uint16_t>> fea
 }
 
 }  // namespace
-
-std::vector<BinaryDescriptor> ToBinaryDescriptors(const cv::Mat& rows) {
-  if (rows.empty()) return {};
-  if (rows.type() != CV_8U || rows.cols != kDescriptorBytes) {
-    throw std::invalid_argument("ToBinaryDescriptors: descriptors must be rows of 32 bytes");
-  }
-  std::vector<BinaryDescriptor> descriptors(static_cast<std::size_t>(rows.rows));
-  for (int row = 0; row < rows.rows; ++row) {
-    std::memcpy(descriptors[row].data(), rows.ptr(row), kDescriptorBytes);
-  }
-  return descriptors;
-}
 
 const char* Name(Weighting weighting) {
   switch (weighting) {

@@ -7,7 +7,7 @@
 #include <string>
 #include <vector>
 
-#include "rotodom/loop/binary_descriptor.h"
+#include "rotodom/features/binary_descriptor.h"
 
 namespace rotslam {
 

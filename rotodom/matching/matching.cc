@@ -2,31 +2,19 @@
 
 #include <algorithm>
 #include <array>
-#include <bit>
 #include <cmath>
-#include <cstring>
 #include <limits>
+#include <map>
 #include <numbers>
 #include <stdexcept>
 
+#include "rotodom/features/binary_descriptor.h"
 #include "rotodom/types/options.h"
 
 namespace rotslam {
 namespace {
 
 constexpr int kCellPx = 32;
-
-int HammingDistance(const std::uint8_t* a, const std::uint8_t* b) {
-  int distance = 0;
-  for (int word = 0; word < 4; ++word) {
-    std::uint64_t x;
-    std::uint64_t y;
-    std::memcpy(&x, a + 8 * word, 8);
-    std::memcpy(&y, b + 8 * word, 8);
-    distance += std::popcount(x ^ y);
-  }
-  return distance;
-}
 
 // Keypoints of one frame by image cell.
 class KeypointGrid {
@@ -43,6 +31,14 @@ class KeypointGrid {
       const int row = std::max(0, static_cast<int>(keypoint.y()) / kCellPx);
       cells_[row * columns_ + column].push_back(index);
     }
+  }
+
+  // All keypoints, in the order in which a search over the whole image comes by them.
+  std::vector<int> All() const {
+    std::vector<int> all;
+    all.reserve(features_.size());
+    for (const std::vector<int>& cell : cells_) all.insert(all.end(), cell.begin(), cell.end());
+    return all;
   }
 
   template <class Visitor>
@@ -76,39 +72,102 @@ struct Candidate {
   int distance = std::numeric_limits<int>::max();
 };
 
-// Best candidate of each keypoint of frame i; j = -1 where there is none.
-std::vector<Candidate> FindBest(const Features& features_i,
-                                const Features& features_j,
-                                const std::vector<std::optional<Eigen::Vector2d>>& predicted_px,
-                                const KeypointGrid& grid_j,
-                                double radius,
-                                const MatchingOptions& options) {
-  std::vector<Candidate> best(features_i.size());
-  for (int i = 0; i < features_i.size(); ++i) {
-    if (!predicted_px[i]) continue;
-    const std::uint8_t* descriptor = features_i.descriptors.ptr<std::uint8_t>(i);
-    Candidate first;
-    Candidate second;
-    grid_j.VisitWithin(*predicted_px[i], radius, [&](int j) {
-      if (std::abs(features_j.levels[j] - features_i.levels[i]) > options.max_level_step) return;
-      const int distance = HammingDistance(descriptor, features_j.descriptors.ptr<std::uint8_t>(j));
-      if (distance < first.distance) {
-        second = first;
-        first = {j, distance};
-      } else if (distance < second.distance) {
-        second = {j, distance};
-      }
-    });
-    if (first.j < 0 || first.distance > options.max_distance) continue;
-    // The same corner found on the next level is no rival.
-    const bool rival =
-        second.j >= 0 &&
-        (features_j.keypoints_px[second.j] - features_j.keypoints_px[first.j]).norm() > 4.0;
-    if (rival && first.distance > options.ratio * second.distance) continue;
-    best[i] = first;
+// The two nearest of those that one keypoint is compared with; of equals the first.
+struct Nearest {
+  Candidate first;
+  Candidate second;
+
+  void Add(int j, int distance) {
+    if (distance < first.distance) {
+      second = first;
+      first = {j, distance};
+    } else if (distance < second.distance) {
+      second = {j, distance};
+    }
   }
-  return best;
+};
+
+// The nearest of frame j, where it is near enough and has no rival; else j = -1.
+Candidate Choose(const Nearest& nearest,
+                 const Features& features_j,
+                 const MatchingOptions& options) {
+  const auto& [first, second] = nearest;
+  if (first.j < 0 || first.distance > options.max_distance) return {};
+  // The same corner found on the next level is no rival.
+  const bool rival =
+      second.j >= 0 &&
+      (features_j.keypoints_px[second.j] - features_j.keypoints_px[first.j]).norm() > 4.0;
+  if (rival && first.distance > options.ratio * second.distance) return {};
+  return first;
 }
+
+// Looks for each keypoint of frame i in frame j. What comes out has an entry for each of them.
+class Search {
+ public:
+  Search(const Features& features_i, const Features& features_j, const MatchingOptions& options)
+      : features_i_(features_i),
+        features_j_(features_j),
+        options_(options),
+        descriptors_i_(ToBinaryDescriptors(features_i.descriptors)),
+        descriptors_j_(ToBinaryDescriptors(features_j.descriptors)),
+        grid_j_(features_j) {}
+
+  // Within a circle around where it should be, if that is known.
+  std::vector<Candidate> Around(const std::vector<std::optional<Eigen::Vector2d>>& predicted_px,
+                                double radius) const {
+    std::vector<Candidate> best(features_i_.size());
+    for (int i = 0; i < features_i_.size(); ++i) {
+      if (!predicted_px[i]) continue;
+      Nearest nearest;
+      grid_j_.VisitWithin(*predicted_px[i], radius, [&](int j) {
+        if (!IsComparable(features_i_.levels[i], j)) return;
+        nearest.Add(j, HammingDistance(descriptors_i_[i], descriptors_j_[j]));
+      });
+      best[i] = Choose(nearest, features_j_, options_);
+    }
+    return best;
+  }
+
+  // In the whole image. What a keypoint can be compared with lies side by side, so that of each
+  // pair nothing is left to be found but the distance.
+  std::vector<Candidate> Anywhere() const {
+    struct Group {
+      std::vector<int> indices;
+      std::vector<BinaryDescriptor> descriptors;
+    };
+    std::map<int, Group> comparable;  // by the level of frame i
+    for (const int level : features_i_.levels) comparable[level];
+    for (const int j : grid_j_.All()) {
+      for (auto& [level, group] : comparable) {
+        if (!IsComparable(level, j)) continue;
+        group.indices.push_back(j);
+        group.descriptors.push_back(descriptors_j_[j]);
+      }
+    }
+    std::vector<Candidate> best(features_i_.size());
+    for (int i = 0; i < features_i_.size(); ++i) {
+      const Group& group = comparable.at(features_i_.levels[i]);
+      Nearest nearest;
+      for (std::size_t k = 0; k < group.indices.size(); ++k) {
+        nearest.Add(group.indices[k], HammingDistance(descriptors_i_[i], group.descriptors[k]));
+      }
+      best[i] = Choose(nearest, features_j_, options_);
+    }
+    return best;
+  }
+
+ private:
+  bool IsComparable(int level_i, int j) const {
+    return std::abs(features_j_.levels[j] - level_i) <= options_.max_level_step;
+  }
+
+  const Features& features_i_;
+  const Features& features_j_;
+  const MatchingOptions& options_;
+  std::vector<BinaryDescriptor> descriptors_i_;
+  std::vector<BinaryDescriptor> descriptors_j_;
+  KeypointGrid grid_j_;
+};
 
 // Keeps, of all keypoints of frame i that chose the same one of frame j, the nearest.
 void KeepMutual(std::vector<Candidate>& best, int num_j) {
@@ -184,22 +243,15 @@ Matches MatchFeatures(const Features& features_i,
   for (const Eigen::Vector3d& bearing : features_i.bearings) {
     predicted_px.push_back(camera.Project(predicted_j_from_i * bearing));
   }
-  const KeypointGrid grid_j(features_j);
-  const struct {
-    SearchRange range;
-    double radius;
-  } searches[] = {{SearchRange::kGuided, options.radius_px},
-                  {SearchRange::kWide, options.wide_radius_px},
-                  {SearchRange::kWholeImage, 1e6}};
+  const Search search(features_i, features_j, options);
   std::vector<Candidate> best;
-  for (const auto& search : searches) {
-    if (search.range == SearchRange::kWholeImage) {
-      // The prediction has failed, so features that it sends out of the image count as well.
-      for (std::size_t i = 0; i < predicted_px.size(); ++i)
-        predicted_px[i] = features_i.keypoints_px[i];
-    }
-    result.range = search.range;
-    best = FindBest(features_i, features_j, predicted_px, grid_j, search.radius, options);
+  for (const SearchRange range :
+       {SearchRange::kGuided, SearchRange::kWide, SearchRange::kWholeImage}) {
+    result.range = range;
+    // Where the prediction has failed, features that it sends out of the image count as well.
+    best = range == SearchRange::kWholeImage ? search.Anywhere()
+           : range == SearchRange::kWide     ? search.Around(predicted_px, options.wide_radius_px)
+                                             : search.Around(predicted_px, options.radius_px);
     KeepMutual(best, features_j.size());
     KeepCommonTurn(best, features_i, features_j);
     const auto found =

@@ -8,6 +8,7 @@
 #include <gtest/gtest.h>
 #include <opencv2/features2d.hpp>
 
+#include "rotodom/features/binary_descriptor.h"
 #include "rotodom/features/orb_descriptor.h"
 #include "tests/rotodom/features/repeatability.h"
 #include "tests/rotodom/features/textured_world.h"
@@ -476,6 +477,16 @@ TEST(FeatureOptions, NamesTheFirstFieldOutOfRange) {
   EXPECT_TRUE(problem([](Options o) { o.fast_threshold = 3; }).starts_with("fast_threshold is 3"));
   EXPECT_TRUE(
       problem([](Options o) { o.min_distance_px = -1.0; }).starts_with("min_distance_px is -1"));
+}
+
+TEST(BinaryDescriptors, AreTheRowsOfAMatrix) {
+  cv::Mat rows(2, 32, CV_8U);
+  for (int k = 0; k < 64; ++k) rows.data[k] = static_cast<std::uint8_t>(k);
+  const std::vector<BinaryDescriptor> descriptors = ToBinaryDescriptors(rows);
+  ASSERT_EQ(descriptors.size(), 2U);
+  EXPECT_EQ(descriptors[1][0], 0x2726252423222120U);
+  EXPECT_TRUE(ToBinaryDescriptors(cv::Mat()).empty());
+  EXPECT_THROW(ToBinaryDescriptors(cv::Mat(2, 31, CV_8U)), std::invalid_argument);
 }
 
 }  // namespace

@@ -244,16 +244,6 @@ TEST(Vocabulary, RefusesWhatItCannotIndex) {
   EXPECT_THROW(vocabulary.Transform(kImage, -1), std::invalid_argument);
 }
 
-TEST(BinaryDescriptors, AreTheRowsOfAMatrix) {
-  cv::Mat rows(2, 32, CV_8U);
-  for (int k = 0; k < 64; ++k) rows.data[k] = static_cast<std::uint8_t>(k);
-  const std::vector<BinaryDescriptor> descriptors = ToBinaryDescriptors(rows);
-  ASSERT_EQ(descriptors.size(), 2U);
-  EXPECT_EQ(descriptors[1][0], 0x2726252423222120U);
-  EXPECT_TRUE(ToBinaryDescriptors(cv::Mat()).empty());
-  EXPECT_THROW(ToBinaryDescriptors(cv::Mat(2, 31, CV_8U)), std::invalid_argument);
-}
-
 TEST(DefaultVocabulary, IsLargeEnoughToTellPlacesApart) {
   const Vocabulary vocabulary = DefaultVocabulary();
   EXPECT_GT(vocabulary.num_words(), 10000);
