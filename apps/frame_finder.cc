@@ -2,11 +2,9 @@
 
 #include <algorithm>
 #include <cmath>
-#include <cstdint>
 #include <iterator>
 
 #include "apps/absolute_pose.h"
-#include "rotodom/matching/matching.h"
 #include "rotodom/tracking/view.h"
 #include "rotodom/types/median.h"
 
@@ -21,10 +19,11 @@ constexpr int kMaxNeighbours = 4;
 }  // namespace
 
 FrameFinder::FrameFinder(const std::vector<const Reconstruction*>& maps,
-                         const std::map<FrameId, Features>& places,
+                         PlaceMatches& places,
                          const Camera& camera,
-                         const RelocalisationOptions& options)
-    : maps_(maps), places_(places), camera_(camera), options_(options) {
+                         const RelocalisationOptions& options,
+                         std::uint64_t seed)
+    : maps_(maps), places_(places), camera_(camera), options_(options), seed_(seed) {
   for (int k = 0; k < std::ssize(maps); ++k) {
     for (const auto& [frame, center] : maps[k]->center_in_world) {
       if (maps[k]->cam_from_world.contains(frame)) map_of_[frame] = k;
@@ -75,7 +74,7 @@ const std::vector<TrackId>& FrameFinder::PointsOf(FrameId frame) const {
 
 bool FrameFinder::IsOpen(const Lookalike& pair) const {
   const auto is_known = [&](FrameId frame) {
-    return map_of_.contains(frame) && places_.contains(frame);
+    return map_of_.contains(frame) && places_.places().contains(frame);
   };
   return is_known(pair.frame) && is_known(pair.match);
 }
@@ -111,7 +110,7 @@ std::optional<FoundFrame> FrameFinder::FindByTracks(FrameId frame,
 
 std::vector<FrameId> FrameFinder::NeighboursOf(FrameId frame) const {
   std::vector<std::pair<int, FrameId>> common;
-  for (const auto& [other, features] : places_) {
+  for (const auto& [other, features] : places_.places()) {
     if (other == frame || !map_of_.contains(other)) continue;
     const int count = CountCommon(frame, other);
     if (count >= kMinCommonPoints) common.emplace_back(-count, other);
@@ -149,10 +148,9 @@ void FrameFinder::Recognise(FrameId frame, FrameId match, std::vector<Sighted>& 
       MapOf(frame) == MapOf(match)
           ? PresentPose(frame).cam_from_world * PresentPose(match).cam_from_world.Inverse()
           : Rotation();
-  const Features& from = places_.at(match);
-  const Features& to = places_.at(frame);
-  const Matches matches = MatchFeatures(from, to, predicted, camera_, {});
-  for (const Match& pair : matches.matches) {
+  const Features& from = places_.places().at(match);
+  const Features& to = places_.places().at(frame);
+  for (const Match& pair : places_.Between(match, frame, predicted)) {
     const auto point = PointAt(match, from.keypoints_px[pair.i.value]);
     if (!point) continue;
     const Sighted one = {*point, to.keypoints_px[pair.j.value]};
@@ -187,7 +185,7 @@ std::optional<FoundFrame> FrameFinder::FindPose(FrameId frame,
   ResectionOptions resection;
   resection.max_error_px = options_.max_error_px;
   resection.min_inliers = options_.min_inliers;
-  const auto seed = static_cast<std::uint64_t>(frame.value);
+  const std::uint64_t seed = seed_ + static_cast<std::uint64_t>(frame.value) * 7919U;
   const auto pose = FindAbsolutePose(camera_, sightings, resection, seed);
   if (!pose) return std::nullopt;
   FoundFrame found;
@@ -197,7 +195,7 @@ std::optional<FoundFrame> FrameFinder::FindPose(FrameId frame,
   found.is_displaced = found.num_present + options_.min_gain_sigmas * std::sqrt(pose->num_inliers) <
                        pose->num_inliers;
   found.is_right = found.is_right && !found.is_displaced;
-  if (found.is_displaced) Describe(*pose, points, sightings, found);
+  if (found.is_displaced) Describe(*pose, map, points, sightings, found);
   return found;
 }
 
@@ -222,6 +220,7 @@ void FrameFinder::Compare(const std::vector<Sighted>& points,
 }
 
 void FrameFinder::Describe(const ResectedPose& pose,
+                           int map_of_points,
                            const std::vector<Sighted>& points,
                            const std::vector<PointSighting>& sightings,
                            FoundFrame& found) const {
@@ -229,6 +228,7 @@ void FrameFinder::Describe(const ResectedPose& pose,
   const ResectionStart present = PresentPose(found.frame);
   const ResectionStart now = {pose.cam_from_world, pose.center_in_world, std::nullopt};
   const Reconstruction& map = *maps_[MapOf(found.frame)];
+  const bool is_same_map = MapOf(found.frame) == map_of_points;
   std::vector<double> ratios;
   for (std::size_t k = 0; k < points.size(); ++k) {
     if (!Explains(now, sightings[k])) continue;
@@ -237,7 +237,7 @@ void FrameFinder::Describe(const ResectedPose& pose,
     if (!bearing) continue;
     found.sightings.push_back({points[k].track, {found.frame, px, *bearing, 1.0}});
     const auto own = PointAt(found.frame, px);
-    if (!own || *own == points[k].track) continue;
+    if (!own || (is_same_map && *own == points[k].track)) continue;
     const double depth = (map.point_in_world.at(*own) - present.center_in_world).norm();
     ratios.push_back((sightings[k].point_in_world - now.center_in_world).norm() / depth);
   }

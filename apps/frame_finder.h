@@ -1,5 +1,6 @@
 #pragma once
 
+#include <cstdint>
 #include <map>
 #include <optional>
 #include <utility>
@@ -38,9 +39,10 @@ class FrameFinder {
  public:
   // As Relocalise takes them; they must outlive it.
   FrameFinder(const std::vector<const Reconstruction*>& maps,
-              const std::map<FrameId, Features>& places,
+              PlaceMatches& places,
               const Camera& camera,
-              const RelocalisationOptions& options);
+              const RelocalisationOptions& options,
+              std::uint64_t seed);
 
   // Of a frame that one of the maps has a pose of.
   int MapOf(FrameId frame) const { return map_of_.at(frame); }
@@ -85,14 +87,16 @@ class FrameFinder {
   // What the pose says of the frame's surroundings: they move with it, and their depths say how
   // much larger they become.
   void Describe(const ResectedPose& pose,
+                int map_of_points,
                 const std::vector<Sighted>& points,
                 const std::vector<PointSighting>& sightings,
                 FoundFrame& found) const;
 
   const std::vector<const Reconstruction*>& maps_;
-  const std::map<FrameId, Features>& places_;
+  PlaceMatches& places_;
   const Camera& camera_;
   const RelocalisationOptions& options_;
+  std::uint64_t seed_;
   std::map<FrameId, int> map_of_;
   std::map<FrameId, std::vector<Sighted>> seen_;
   std::map<FrameId, std::vector<TrackId>> points_;  // ascending

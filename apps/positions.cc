@@ -151,6 +151,18 @@ void TellCloud(const PositionResult& result, double min_angle_deg, Progress& pro
                 " points: the camera has moved too little for more");
 }
 
+void TellRelocalised(const std::set<FrameId>& frames, Progress& progress) {
+  constexpr std::size_t kMaxNamed = 12;
+  if (frames.empty()) return;
+  std::string names;
+  std::size_t count = 0;
+  for (const FrameId frame : frames) {
+    if (count++ < kMaxNamed) names += " " + std::to_string(frame.value);
+  }
+  if (count > kMaxNamed) names += " and " + std::to_string(count - kMaxNamed) + " more";
+  progress.Say("keyframes found again in another place of the map:" + names);
+}
+
 // No map: every frame stands at the origin.
 PositionResult WithoutMap(PositionResult result, std::string failure) {
   for (const auto& [frame, rotation] : result.cam_from_world) {
@@ -206,37 +218,40 @@ TrackCompletion CompletionWith(const Input& input,
 }
 
 // Moves keyframes to where others that look alike say that they are, as long as that makes the map
-// explain more; how many.
-int Mend(const Orientations& orientations,
-         const std::vector<Track>& tracks,
-         const std::vector<HeldStretch>& held,
-         const PipelineOptions& options,
-         const BundleOptions& bundle_options,
-         const TrackCompletion& complete,
-         RefinedComponents& refined) {
+// explain more; which.
+std::set<FrameId> Mend(const Orientations& orientations,
+                       const std::vector<Track>& tracks,
+                       const std::vector<HeldStretch>& held,
+                       const PipelineOptions& options,
+                       const BundleOptions& bundle_options,
+                       const TrackCompletion& complete,
+                       RefinedComponents& refined) {
   // Where some stand right, others are seen to stand wrong.
   constexpr int kMaxPasses = 3;
-  if (!options.relocalisation.enabled) return 0;
+  std::set<FrameId> moved;
+  if (!options.relocalisation.enabled) return moved;
   std::vector<Lookalike> lookalikes;
   for (const LoopCheck& check : orientations.loops)
     lookalikes.push_back({check.frame, check.match});
-  int num_moved = 0;
   const std::vector<Track> seen = WithBearingsOf(refined.camera, tracks);
+  PlaceMatches places(orientations.places, refined.camera);
   for (int pass = 0; pass < kMaxPasses; ++pass) {
     std::vector<const Reconstruction*> maps;
     for (const BundleResult& bundle : refined.bundles) maps.push_back(&bundle.reconstruction);
     const std::vector<RelocalisedMap> changed = Relocalise(maps,
                                                            seen,
-                                                           orientations.places,
+                                                           places,
                                                            lookalikes,
                                                            refined.camera,
                                                            options.relocalisation,
+                                                           options.krot.seed,
                                                            bundle_options.num_threads);
-    const int count = RefineRelocalised(changed, seen, held, bundle_options, complete, refined);
-    num_moved += count;
-    if (count == 0) break;
+    const std::set<FrameId> now =
+        RefineRelocalised(changed, seen, held, bundle_options, complete, refined);
+    if (now.empty()) break;
+    moved.insert(now.begin(), now.end());
   }
-  return num_moved;
+  return moved;
 }
 
 // FindKeyframePositions from the tracks of all frames.
@@ -311,7 +326,7 @@ PositionResult MapKeyframes(const Orientations& orientations,
   progress.StartStage("bundle adjustment", -1);
   RefinedComponents refined = RefineComponents(
       keyframe_rotations, result.krot, tracks, result.held, camera, bundle_options, complete);
-  result.num_relocalised =
+  result.relocalised =
       Mend(orientations, tracks, result.held, options, bundle_options, complete, refined);
   result.camera = refined.camera;
   for (std::size_t k = 0; k < refined.components.size(); ++k) {
@@ -343,10 +358,7 @@ PositionResult MapKeyframes(const Orientations& orientations,
   }
   progress.EndStage(std::to_string(result.map.point_in_world.size()) + " points, " +
                     DescribeMeanError(result.bundles) + ", " + DescribeRounded(result.camera));
-  if (result.num_relocalised > 0) {
-    progress.Say("keyframes found again in another place of the map: " +
-                 std::to_string(result.num_relocalised));
-  }
+  TellRelocalised(result.relocalised, progress);
   if (auto turning = find_turning()) return *std::move(turning);
 
   return result;

@@ -26,7 +26,7 @@ struct PositionResult {
   KrotSolution krot;
   std::map<FrameId, PoseCovariance> pose_covariance;  // of refined keyframes, where asked for
   std::vector<BundleSummary> bundles;                 // one per component
-  int num_relocalised = 0;                            // keyframes that were in a wrong place
+  std::set<FrameId> relocalised;                      // keyframes that were in a wrong place
   int num_shallow_points = 0;                         // left the cloud: seen under too small angles
   int num_cloud_outliers = 0;                         // points that stood alone and left the cloud
   int num_resected = 0;

@@ -113,6 +113,13 @@ bool ExplainsMore(const BundleResult& bundle,
   return bundle.Usable() && explained(bundle.summary) > num_explained;
 }
 
+// What an adjustment took that led to the other one, or to nothing.
+void AddEffort(const BundleSummary& other, BundleSummary& summary) {
+  summary.iterations += other.iterations;
+  summary.seconds += other.seconds;
+  summary.rounds.insert(summary.rounds.begin(), other.rounds.begin(), other.rounds.end());
+}
+
 }  // namespace
 
 std::vector<Track> WithBearingsOf(const Camera& camera, std::vector<Track> tracks) {
@@ -162,16 +169,16 @@ RefinedComponents RefineComponents(const RotationMap& cam_from_world,
   return refined;
 }
 
-int RefineRelocalised(const std::vector<RelocalisedMap>& maps,
-                      const std::vector<Track>& tracks,
-                      const std::vector<HeldStretch>& held,
-                      BundleOptions options,
-                      const TrackCompletion& complete,
-                      RefinedComponents& refined) {
+std::set<FrameId> RefineRelocalised(const std::vector<RelocalisedMap>& maps,
+                                    const std::vector<Track>& tracks,
+                                    const std::vector<HeldStretch>& held,
+                                    BundleOptions options,
+                                    const TrackCompletion& complete,
+                                    RefinedComponents& refined) {
   options.bridge.enabled = false;
   options.lens.refine_focal = options.lens.refine_distortion = false;
   options.lens.refine_principal_point = false;
-  int num_moved = 0;
+  std::set<FrameId> moved;
   std::set<int> replaced;
   for (const RelocalisedMap& map : maps) {
     MapComponent component;
@@ -184,9 +191,13 @@ int RefineRelocalised(const std::vector<RelocalisedMap>& maps,
                                           refined.camera,
                                           options,
                                           complete);
-    if (!ExplainsMore(bundle, map.parts, refined)) continue;
-    num_moved += map.num_moved;
-    const BundleSummary& before = refined.bundles[LargestOf(map.parts, refined)].summary;
+    BundleSummary& before = refined.bundles[LargestOf(map.parts, refined)].summary;
+    if (!ExplainsMore(bundle, map.parts, refined)) {
+      AddEffort(bundle.summary, before);
+      continue;
+    }
+    moved.insert(map.moved.begin(), map.moved.end());
+    for (const int part : map.parts) AddEffort(refined.bundles[part].summary, bundle.summary);
     bundle.summary.lens_gain = before.lens_gain;
     bundle.summary.lens_refined = before.lens_refined;
     bundle.summary.lens_sigmas = before.lens_sigmas;
@@ -200,7 +211,7 @@ int RefineRelocalised(const std::vector<RelocalisedMap>& maps,
     refined.bundles.erase(refined.bundles.begin() + *part);
     refined.components.erase(refined.components.begin() + *part);
   }
-  return num_moved;
+  return moved;
 }
 
 double MeanErrorPx(const std::vector<BundleSummary>& bundles) {

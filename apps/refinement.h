@@ -40,16 +40,18 @@ RefinedComponents RefineComponents(const RotationMap& cam_from_world,
                                    const TrackCompletion& complete = nullptr);
 
 /// Bundle adjustment once more of the maps that Relocalise has changed, with the lens as it is.
-/// Those that explain more of the images then replace the components that they were made of.
+/// Those that explain more of the images then replace the components that they were made of. Their
+/// rounds, iterations and seconds count those of these components, too, and where a map is refused
+/// the component counts the map's.
 /// @param tracks   as RefineComponents takes them, with the bearings of `refined.camera`.
 /// @param refined  what Relocalise was given.
-/// @return  how many keyframes stand elsewhere now.
-int RefineRelocalised(const std::vector<RelocalisedMap>& maps,
-                      const std::vector<Track>& tracks,
-                      const std::vector<HeldStretch>& held,
-                      BundleOptions options,
-                      const TrackCompletion& complete,
-                      RefinedComponents& refined);
+/// @return  the keyframes that stand elsewhere now.
+std::set<FrameId> RefineRelocalised(const std::vector<RelocalisedMap>& maps,
+                                    const std::vector<Track>& tracks,
+                                    const std::vector<HeldStretch>& held,
+                                    BundleOptions options,
+                                    const TrackCompletion& complete,
+                                    RefinedComponents& refined);
 
 /// Mean reprojection error over the observations of all bundles; zero where there are none.
 double MeanErrorPx(const std::vector<BundleSummary>& bundles);

@@ -1,6 +1,7 @@
 #include "apps/relocalisation.h"
 
 #include <algorithm>
+#include <functional>
 #include <iterator>
 #include <stdexcept>
 #include <utility>
@@ -12,19 +13,26 @@
 namespace rotslam {
 namespace {
 
-// What is found of the pairs.
-std::vector<FoundFrame> FindPairs(const FrameFinder& finder,
-                                  const std::vector<Lookalike>& pairs,
-                                  int num_threads) {
-  std::vector<std::optional<FoundFrame>> found(pairs.size());
-  ParallelFor(static_cast<int>(pairs.size()), num_threads, [&](int k) {
-    if (finder.IsOpen(pairs[k])) found[k] = finder.Find(pairs[k]);
-  });
+// What `find` finds for 0 to `count` - 1.
+std::vector<FoundFrame> FindEach(int count,
+                                 int num_threads,
+                                 const std::function<std::optional<FoundFrame>(int)>& find) {
+  std::vector<std::optional<FoundFrame>> found(count);
+  ParallelFor(count, num_threads, [&](int k) { found[k] = find(k); });
   std::vector<FoundFrame> all;
   for (std::optional<FoundFrame>& one : found) {
     if (one) all.push_back(*std::move(one));
   }
   return all;
+}
+
+// What is found of the pairs.
+std::vector<FoundFrame> FindPairs(const FrameFinder& finder,
+                                  const std::vector<Lookalike>& pairs,
+                                  int num_threads) {
+  return FindEach(static_cast<int>(pairs.size()), num_threads, [&](int k) {
+    return finder.IsOpen(pairs[k]) ? finder.Find(pairs[k]) : std::nullopt;
+  });
 }
 
 // The same; where a frame turns out to be displaced, neighbours are asked on both sides, too.
@@ -56,15 +64,9 @@ std::vector<FoundFrame> FindAllByTracks(const FrameFinder& finder,
   std::vector<FrameId> frames;
   frames.reserve(known.size());
   for (const auto& [frame, points] : known) frames.push_back(frame);
-  std::vector<std::optional<FoundFrame>> found(frames.size());
-  ParallelFor(static_cast<int>(frames.size()), num_threads, [&](int k) {
-    found[k] = finder.FindByTracks(frames[k], known.at(frames[k]));
+  return FindEach(static_cast<int>(frames.size()), num_threads, [&](int k) {
+    return finder.FindByTracks(frames[k], known.at(frames[k]));
   });
-  std::vector<FoundFrame> all;
-  for (std::optional<FoundFrame>& one : found) {
-    if (one) all.push_back(*std::move(one));
-  }
-  return all;
 }
 
 // The frames of one map that move: of two that contradict each other one does.
@@ -271,15 +273,16 @@ std::optional<std::string> RelocalisationOptions::Problem() const {
 
 std::vector<RelocalisedMap> Relocalise(const std::vector<const Reconstruction*>& maps,
                                        const std::vector<Track>& tracks,
-                                       const std::map<FrameId, Features>& places,
+                                       PlaceMatches& places,
                                        const std::vector<Lookalike>& lookalikes,
                                        const Camera& camera,
                                        const RelocalisationOptions& options,
+                                       std::uint64_t seed,
                                        int num_threads) {
   if (const auto problem = options.Problem()) {
     throw std::invalid_argument("RelocalisationOptions: " + *problem);
   }
-  const FrameFinder finder(maps, places, camera, options);
+  const FrameFinder finder(maps, places, camera, options, seed);
   std::vector<FoundFrame> all = FindAll(finder, lookalikes, num_threads);
   std::vector<FoundFrame> more = FindAllByTracks(finder, tracks, num_threads);
   std::move(more.begin(), more.end(), std::back_inserter(all));
@@ -316,7 +319,7 @@ std::vector<RelocalisedMap> Relocalise(const std::vector<const Reconstruction*>&
           rotation = own.Move(rotation);
           place = own.Move(place);
         }
-        now.num_moved += is_displaced || !stands ? 1 : 0;
+        if (is_displaced || !stands) now.moved.insert(frame);
         now.cam_from_world[frame] = move.Move(rotation);
         now.center_in_world[frame] = move.Move(place);
       }
@@ -327,7 +330,7 @@ std::vector<RelocalisedMap> Relocalise(const std::vector<const Reconstruction*>&
         Append(link->sightings, now.sightings);
       }
     }
-    if (now.num_moved > 0) changed.push_back(std::move(now));
+    if (!now.moved.empty()) changed.push_back(std::move(now));
   }
   return changed;
 }

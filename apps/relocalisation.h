@@ -1,13 +1,14 @@
 #pragma once
 
+#include <cstdint>
 #include <map>
 #include <optional>
 #include <set>
 #include <string>
 #include <vector>
 
+#include "apps/place_matches.h"
 #include "rotodom/camera/camera.h"
-#include "rotodom/features/features.h"
 #include "rotodom/types/reconstruction.h"
 
 namespace rotslam {
@@ -47,7 +48,7 @@ struct RelocalisedMap {
   CenterMap center_in_world;
   // Observations of known points that it rests on.
   std::vector<std::pair<TrackId, Observation>> sightings;
-  int num_moved = 0;  // frames that stand elsewhere than in the largest of the parts
+  std::set<FrameId> moved;  // those that stand elsewhere than in the largest of the parts
 };
 
 /// Finds frames that stand in a wrong place. Of two frames that look alike, one is placed anew
@@ -59,7 +60,7 @@ struct RelocalisedMap {
 /// adjustment has to say whether they are better.
 /// @param maps    each in its own world; no frame in two of them.
 /// @param tracks  with the ids of the maps' points, and all observations, whether they fit or not.
-/// @param places  described corners of frames, where a global shutter would see them.
+/// @param places  to be given again where Relocalise is asked again.
 /// @return  the maps that change; the same at any `num_threads`. Throws std::invalid_argument when
 /// an option is out of range.
 /// Error:   to a few hundredths of the distance to the points (relocalisation tests).
@@ -68,10 +69,11 @@ struct RelocalisedMap {
 /// believe is ours.
 std::vector<RelocalisedMap> Relocalise(const std::vector<const Reconstruction*>& maps,
                                        const std::vector<Track>& tracks,
-                                       const std::map<FrameId, Features>& places,
+                                       PlaceMatches& places,
                                        const std::vector<Lookalike>& lookalikes,
                                        const Camera& camera,
                                        const RelocalisationOptions& options,
+                                       std::uint64_t seed,
                                        int num_threads);
 
 }  // namespace rotslam

@@ -385,7 +385,8 @@ void AddPositions(const PositionResult& positions, const Camera& camera, RunSumm
   summary.counts.push_back({"shallow_points", std::int64_t{positions.num_shallow_points}});
   summary.counts.push_back({"cloud_outliers", std::int64_t{positions.num_cloud_outliers}});
   summary.counts.push_back({"components", count(positions.components.size())});
-  summary.counts.push_back({"relocalised_keyframes", std::int64_t{positions.num_relocalised}});
+  summary.counts.push_back(
+      {"relocalised_keyframes", static_cast<std::int64_t>(positions.relocalised.size())});
   summary.counts.push_back({"resected_frames", std::int64_t{positions.num_resected}});
   summary.counts.push_back({"interpolated_frames", std::int64_t{positions.num_interpolated}});
   summary.segments = Segments(positions);

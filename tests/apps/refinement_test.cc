@@ -108,11 +108,35 @@ class TwoComponents : public testing::Test {
     map.cam_from_world = scene_.cam_from_world;
     map.center_in_world = scene_.true_center_in_world;
     for (auto& [frame, center] : map.center_in_world) {
-      if (frame.value >= kFirstLate) center += away;
+      if (frame.value < kFirstLate) continue;
+      center += away;
+      map.moved.insert(frame);
     }
     map.sightings = common_;
-    map.num_moved = static_cast<int>(map.center_in_world.size()) - kFirstLate;
     return map;
+  }
+
+  // That the components count the rounds of these, and of one adjustment more.
+  void ExpectEffortBeside(const std::vector<BundleResult>& parts) const {
+    const auto num_rounds = [](const std::vector<BundleResult>& bundles) {
+      std::size_t count = 0;
+      for (const BundleResult& bundle : bundles) {
+        count += bundle.summary.rounds.size();
+        int iterations = 0;
+        double seconds = 0.0;
+        for (const BundleRoundSummary& round : bundle.summary.rounds) {
+          iterations += round.iterations;
+          seconds += round.seconds;
+        }
+        EXPECT_EQ(bundle.summary.iterations, iterations);
+        EXPECT_GE(bundle.summary.seconds, seconds);
+      }
+      return count;
+    };
+    EXPECT_GT(num_rounds(refined_.bundles), num_rounds(parts));
+    for (const BundleResult& bundle : refined_.bundles) {
+      EXPECT_EQ(bundle.summary.rounds.back().final_cost, bundle.summary.final_cost);
+    }
   }
 
   Scene scene_;
@@ -123,12 +147,14 @@ class TwoComponents : public testing::Test {
 
 TEST_F(TwoComponents, BecomeOneThatExplainsMore) {
   ASSERT_EQ(refined_.components.size(), 2U);
-  const int num_moved =
+  const std::vector<BundleResult> parts = refined_.bundles;
+  const std::set<FrameId> moved =
       RefineRelocalised({WholeMap({0.3, 0.0, 0.2})}, tracks_, {}, {}, nullptr, refined_);
-  EXPECT_EQ(num_moved, 10);
+  EXPECT_EQ(moved.size(), 10U);
   ASSERT_EQ(refined_.components.size(), 1U);
   ASSERT_EQ(refined_.bundles.size(), 1U);
   EXPECT_EQ(refined_.components[0].keyframes.size(), 30U);
+  ExpectEffortBeside(parts);
   EXPECT_LT(ErrorOf(refined_.bundles[0], scene_), 2.0 * ErrorOf(SolveChain(scene_, "l1"), scene_));
 }
 
@@ -137,9 +163,11 @@ TEST_F(TwoComponents, StayWhereTheOneExplainsLess) {
   for (auto& [frame, rotation] : wrong.cam_from_world) {
     if (frame.value >= kFirstLate) rotation = Rotation::Exp({0.0, 0.05 * frame.value, 0.0});
   }
-  EXPECT_EQ(RefineRelocalised({wrong}, tracks_, {}, {}, nullptr, refined_), 0);
+  const std::vector<BundleResult> parts = refined_.bundles;
+  EXPECT_TRUE(RefineRelocalised({wrong}, tracks_, {}, {}, nullptr, refined_).empty());
   EXPECT_EQ(refined_.components.size(), 2U);
-  EXPECT_EQ(refined_.bundles.size(), 2U);
+  ASSERT_EQ(refined_.bundles.size(), 2U);
+  ExpectEffortBeside(parts);
 }
 
 struct Kept {

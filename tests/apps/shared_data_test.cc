@@ -87,6 +87,20 @@ TEST_F(SharedData, SevenScenesKitchen) {
   EXPECT_LE(NumHeldFrames(), 20);  // of 400
 }
 
+// The camera is lost for a moment on frame 53: what comes after knows nothing of the map, and is
+// found again in it by what it looks like.
+TEST_F(SharedData, EurocV101BehindABreak) {
+  ROTSLAM_SKIP_WITHOUT("euroc_v101_keyframes");
+  ASSERT_NO_FATAL_FAILURE(Do("run", "euroc_v101_keyframes", {"--last=65", "--seed=8"}));
+  const TrajectoryMetrics metrics =
+      Compare(Data("euroc_v101_keyframes/groundtruth_cam0_tum.txt"), Out() / "trajectory_tum.txt");
+  EXPECT_EQ(metrics.num_poses, 66);
+  EXPECT_LT(metrics.ate_m.value_or(1e9), 0.05);  // 0.21 where the last keyframes stay where they are
+  const nlohmann::json summary = ReadSummary(Out());
+  EXPECT_GE(summary.at("counts").at("relocalised_keyframes"), 1);
+  EXPECT_EQ(summary.at("counts").at("components"), 1);
+}
+
 TEST_F(SharedData, Pan720NeverLeavesItsPlace) {
   ROTSLAM_SKIP_WITHOUT("pan720");
   ASSERT_NO_FATAL_FAILURE(Do("run", "pan720", {"--camera", Camera("pan720.yaml")}));
