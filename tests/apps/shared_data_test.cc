@@ -33,6 +33,7 @@ class SharedData : public testing::Test {
     const CommandResult result =
         Rotslam({command, Data(sequence).string(), "--out=" + Out().string()}, more);
     ASSERT_EQ(result.exit_code, 0) << result.error;
+    EXPECT_THAT(result.error, testing::Not(testing::HasSubstr("Logging")));  // of libraries
   }
 
   fs::path Out() const { return folder_.path() / "out"; }
