@@ -60,8 +60,8 @@ int main(int argc, char** argv) {
     rotslam::KeepFreedMemory();
     // A file beyond a limit on sizes is a disk that is full: an error of the write, not the end.
     std::signal(SIGXFSZ, SIG_IGN);
-    // Ceres tells of steps and solves that fail, also of trials that may; what matters is in our own
-    // results.
+    // Ceres tells of steps and solves that fail, also of trials that may; what matters is in our
+    // own results.
     FLAGS_minloglevel = google::GLOG_FATAL;
     // Our stages bring their own threads; OpenCV's pool under them only gets in the way.
     cv::setNumThreads(1);
