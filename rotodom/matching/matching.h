@@ -59,7 +59,9 @@ struct Matches {
 /// Matches two frames' descriptors around the positions that the predicted rotation gives: the best
 /// candidate of each keypoint of frame i by ratio test; of several that chose the same keypoint of
 /// frame j, the nearest; of those, the ones whose patches turn as most do. Searches wider only
-/// where too few are found. Cost:    n_i times the number of features in the search circle.
+/// where too few are found.
+/// Cost:    n_i times the number of features in the search circle; for 3,000 features each 3 ms
+/// where the prediction holds, 30 where the whole image has to be searched (matching_bench).
 Matches MatchFeatures(const Features& features_i,
                       const Features& features_j,
                       const Rotation& predicted_j_from_i,
