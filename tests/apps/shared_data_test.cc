@@ -96,7 +96,8 @@ TEST_F(SharedData, EurocV101BehindABreak) {
   const TrajectoryMetrics metrics =
       Compare(Data("euroc_v101_keyframes/groundtruth_cam0_tum.txt"), Out() / "trajectory_tum.txt");
   EXPECT_EQ(NumPoses("trajectory_tum.txt"), 66u);
-  EXPECT_LT(metrics.ate_m.value_or(1e9), 0.05);  // 0.21 where the last keyframes stay where they are
+  EXPECT_LT(metrics.ate_m.value_or(1e9),
+            0.05);  // 0.21 where the last keyframes stay where they are
   const nlohmann::json summary = ReadSummary(Out());
   EXPECT_GE(summary.at("counts").at("relocalised_keyframes"), 1);
   EXPECT_EQ(summary.at("counts").at("components"), 1);
