@@ -6,6 +6,8 @@
 #include <memory>
 #include <optional>
 
+#include "rotodom/tracking/shutter.h"
+
 namespace rotslam {
 
 MapViews ReadMapViews(const std::string& path,
@@ -57,6 +59,20 @@ void SetMotions(const Orientations& orientations, const Reconstruction& map, Map
     const double seconds = time_s(to->first) - time_s(from->first);
     if (seconds > 0.0) view.velocity = (to->second - from->second) / seconds;
   }
+}
+
+std::map<FrameId, Features> DescribeViews(const MapViews& views,
+                                          const Camera& camera,
+                                          const FeatureOptions& options,
+                                          int num_threads) {
+  std::map<FrameId, Features> described;
+  for (const auto& [frame, view] : views) {
+    Features& corners = described[frame];
+    corners = ExtractFeatures(view.image, frame, camera, options, num_threads);
+    corners.rgb = {};
+    MoveToMidFrame(camera, view.rate, corners);
+  }
+  return described;
 }
 
 }  // namespace rotslam

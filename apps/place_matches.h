@@ -14,8 +14,8 @@ namespace rotslam {
 /// Matches between places, kept for whoever asks again.
 class PlaceMatches {
  public:
-  /// @param places  described corners of frames, where a global shutter would see them; both must
-  /// outlive it.
+  /// @param places  described corners of frames, where a global shutter would see them; more may
+  /// come. Both must outlive it.
   PlaceMatches(const std::map<FrameId, Features>& places, const Camera& camera)
       : places_(places), camera_(camera) {}
 

@@ -7,6 +7,7 @@
 #include <set>
 
 #include "apps/map_views.h"
+#include "apps/mending.h"
 #include "apps/placement.h"
 #include "apps/turning.h"
 #include "output/cloud_outliers.h"
@@ -197,69 +198,53 @@ std::vector<Track> TracksOf(const Orientations& orientations) {
       orientations.edge_matches, orientations.features, AllFrames(orientations.cam_from_world), 2);
 }
 
-// Completes tracks with the images of the map's frames; null where that is not asked for.
-TrackCompletion CompletionWith(const Input& input,
-                               const Orientations& orientations,
-                               const PipelineOptions& options,
-                               int num_threads,
-                               Progress& progress) {
-  if (!options.completion.enabled) return nullptr;
-  return [&, num_threads](const Reconstruction& map, const Camera& camera) {
-    std::set<FrameId> frames;
-    for (const auto& [frame, center] : map.center_in_world) frames.insert(frame);
-    MapViews views =
-        ReadMapViews(input.path, options.sequence, frames, [&](const std::string& problem) {
-          progress.Warn(problem +
-                        "; points are not looked for in images that cannot be read again");
-        });
+// Reads images of frames of the map again.
+using ViewReader =
+    std::function<MapViews(const Reconstruction& map, const std::set<FrameId>& frames)>;
+
+ViewReader ReaderOf(const Input& input,
+                    const Orientations& orientations,
+                    const SequenceOptions& options,
+                    Progress& progress) {
+  return [&](const Reconstruction& map, const std::set<FrameId>& frames) {
+    MapViews views = ReadMapViews(input.path, options, frames, [&](const std::string& problem) {
+      progress.Warn(problem + "; points are not looked for in images that cannot be read again");
+    });
     SetMotions(orientations, map, views);
-    return CompleteTracks(map, views, camera, options.completion, num_threads);
+    return views;
   };
 }
 
-// Moves keyframes to where others that look alike say that they are, as long as that makes the map
-// explain more; which.
-std::set<FrameId> Mend(const Orientations& orientations,
-                       const std::vector<Track>& tracks,
-                       const std::vector<HeldStretch>& held,
-                       const PipelineOptions& options,
-                       const BundleOptions& bundle_options,
-                       const TrackCompletion& complete,
-                       RefinedComponents& refined) {
-  // Where some stand right, others are seen to stand wrong.
-  constexpr int kMaxPasses = 3;
-  std::set<FrameId> moved;
-  if (!options.relocalisation.enabled) return moved;
-  std::vector<Lookalike> lookalikes;
-  for (const LoopCheck& check : orientations.loops)
-    lookalikes.push_back({check.frame, check.match});
-  const std::vector<Track> seen = WithBearingsOf(refined.camera, tracks);
-  PlaceMatches places(orientations.places, refined.camera);
-  for (int pass = 0; pass < kMaxPasses; ++pass) {
-    std::vector<const Reconstruction*> maps;
-    for (const BundleResult& bundle : refined.bundles) maps.push_back(&bundle.reconstruction);
-    const std::vector<RelocalisedMap> changed = Relocalise(maps,
-                                                           seen,
-                                                           places,
-                                                           lookalikes,
-                                                           refined.camera,
-                                                           options.relocalisation,
-                                                           options.krot.seed,
-                                                           bundle_options.num_threads);
-    const std::set<FrameId> now =
-        RefineRelocalised(changed, seen, held, bundle_options, complete, refined);
-    if (now.empty()) break;
-    moved.insert(now.begin(), now.end());
-  }
-  return moved;
+// Completes tracks with the images of the map's frames; null where that is not asked for.
+// @param read  may be null.
+TrackCompletion CompletionWith(const ViewReader& read,
+                               const CompletionOptions& options,
+                               int num_threads) {
+  if (!options.enabled || !read) return nullptr;
+  return [&, num_threads](const Reconstruction& map, const Camera& camera) {
+    std::set<FrameId> frames;
+    for (const auto& [frame, center] : map.center_in_world) frames.insert(frame);
+    return CompleteTracks(map, read(map, frames), camera, options, num_threads);
+  };
+}
+
+// Describes frames by their images; null where these are not to be had.
+FrameDescription DescriptionWith(const ViewReader& read,
+                                 const Camera& camera,
+                                 const FeatureOptions& options,
+                                 int num_threads) {
+  if (!read) return nullptr;
+  return [&, num_threads](const Reconstruction& map, const std::set<FrameId>& frames) {
+    return DescribeViews(read(map, frames), camera, options, num_threads);
+  };
 }
 
 // FindKeyframePositions from the tracks of all frames.
-// @param complete  may be null.
+// @param read  may be null.
 PositionResult MapKeyframes(const Orientations& orientations,
                             const std::vector<Track>& all_tracks,
                             const Camera& camera,
-                            const TrackCompletion& complete,
+                            const ViewReader& read,
                             const PipelineOptions& options,
                             int num_threads,
                             Progress& progress) {
@@ -324,10 +309,25 @@ PositionResult MapKeyframes(const Orientations& orientations,
   }
 
   progress.StartStage("bundle adjustment", -1);
+  const TrackCompletion complete = CompletionWith(read, options.completion, num_threads);
   RefinedComponents refined = RefineComponents(
       keyframe_rotations, result.krot, tracks, result.held, camera, bundle_options, complete);
-  result.relocalised =
-      Mend(orientations, tracks, result.held, options, bundle_options, complete, refined);
+  if (options.relocalisation.enabled) {
+    MendingSources sources;
+    for (const LoopCheck& check : orientations.loops) {
+      sources.lookalikes.push_back({check.frame, check.match});
+    }
+    sources.places = orientations.places;
+    sources.describe = DescriptionWith(read, refined.camera, options.rotodom.features, num_threads);
+    sources.complete = complete;
+    sources.held = result.held;
+    result.relocalised = MendMaps(std::move(sources),
+                                  tracks,
+                                  options.relocalisation,
+                                  options.krot.seed,
+                                  bundle_options,
+                                  refined);
+  }
   result.camera = refined.camera;
   for (std::size_t k = 0; k < refined.components.size(); ++k) {
     MapComponent& component = refined.components[k];
@@ -383,14 +383,13 @@ PositionResult FindPositions(const Input& input,
                              Progress& progress) {
   progress.StartStage("tracks", -1);
   std::vector<Track> all_tracks = TracksOf(orientations);
-  PositionResult result =
-      MapKeyframes(orientations,
-                   all_tracks,
-                   input.camera,
-                   CompletionWith(input, orientations, options, num_threads, progress),
-                   options,
-                   num_threads,
-                   progress);
+  PositionResult result = MapKeyframes(orientations,
+                                       all_tracks,
+                                       input.camera,
+                                       ReaderOf(input, orientations, options.sequence, progress),
+                                       options,
+                                       num_threads,
+                                       progress);
   if (result.components.empty()) return result;
 
   progress.StartStage("frames between keyframes", -1);

@@ -73,7 +73,7 @@ std::size_t LargestComponent(const std::vector<MapComponent>& components,
   return largest;
 }
 
-// The tracks with observations more.
+// The tracks with observations more, those of frames that they have already left out.
 std::vector<Track> WithSightings(const std::vector<std::pair<TrackId, Observation>>& sightings,
                                  std::vector<Track> tracks) {
   std::map<TrackId, std::map<FrameId, Observation>> added;
@@ -170,10 +170,10 @@ RefinedComponents RefineComponents(const RotationMap& cam_from_world,
 }
 
 std::set<FrameId> RefineRelocalised(const std::vector<RelocalisedMap>& maps,
-                                    const std::vector<Track>& tracks,
                                     const std::vector<HeldStretch>& held,
                                     BundleOptions options,
                                     const TrackCompletion& complete,
+                                    std::vector<Track>& tracks,
                                     RefinedComponents& refined) {
   options.bridge.enabled = false;
   options.lens.refine_focal = options.lens.refine_distortion = false;
@@ -183,10 +183,11 @@ std::set<FrameId> RefineRelocalised(const std::vector<RelocalisedMap>& maps,
   for (const RelocalisedMap& map : maps) {
     MapComponent component;
     for (const auto& [frame, center] : map.center_in_world) component.keyframes.insert(frame);
+    std::vector<Track> seen = WithSightings(map.sightings, tracks);
     BundleResult bundle = RefineComponent(component,
                                           map.cam_from_world,
                                           map.center_in_world,
-                                          WithSightings(map.sightings, tracks),
+                                          seen,
                                           held,
                                           refined.camera,
                                           options,
@@ -197,6 +198,7 @@ std::set<FrameId> RefineRelocalised(const std::vector<RelocalisedMap>& maps,
       continue;
     }
     moved.insert(map.moved.begin(), map.moved.end());
+    tracks = std::move(seen);
     for (const int part : map.parts) AddEffort(refined.bundles[part].summary, bundle.summary);
     bundle.summary.lens_gain = before.lens_gain;
     bundle.summary.lens_refined = before.lens_refined;

@@ -43,14 +43,16 @@ RefinedComponents RefineComponents(const RotationMap& cam_from_world,
 /// Those that explain more of the images then replace the components that they were made of. Their
 /// rounds, iterations and seconds count those of these components, too, and where a map is refused
 /// the component counts the map's.
-/// @param tracks   as RefineComponents takes them, with the bearings of `refined.camera`.
+/// @param tracks   as Relocalise took them, with the bearings of `refined.camera`; get the
+/// sightings
+///                 of the maps that are kept.
 /// @param refined  what Relocalise was given.
 /// @return  the keyframes that stand elsewhere now.
 std::set<FrameId> RefineRelocalised(const std::vector<RelocalisedMap>& maps,
-                                    const std::vector<Track>& tracks,
                                     const std::vector<HeldStretch>& held,
                                     BundleOptions options,
                                     const TrackCompletion& complete,
+                                    std::vector<Track>& tracks,
                                     RefinedComponents& refined);
 
 /// Mean reprojection error over the observations of all bundles; zero where there are none.

@@ -220,12 +220,7 @@ bool LoopClosure::TakeOutShutter(const RotationMap& cam_from_world, Features& co
   // The rate in mid-frame is known to half its change, the first row is half a readout away.
   const double error_deg = 0.25 * camera_.readout_s * change.norm() * kDegFromRad;
   if (error_deg > options_.max_shutter_error_deg) return false;
-  for (int n = 0; n < corners.size(); ++n) {
-    const auto bearing = BearingInMidFrame(corners.keypoints_px[n], camera_, rate);
-    if (!bearing) continue;
-    corners.bearings[n] = *bearing;
-    if (const auto moved = camera_.Project(*bearing)) corners.keypoints_px[n] = *moved;
-  }
+  MoveToMidFrame(camera_, rate, corners);
   return true;
 }
 

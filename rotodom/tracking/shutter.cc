@@ -15,4 +15,14 @@ std::optional<Eigen::Vector3d> BearingInMidFrame(const Eigen::Vector2d& keypoint
   return Rotation::Exp(-late_s * rate) * *bearing;
 }
 
+void MoveToMidFrame(const Camera& camera, const Eigen::Vector3d& rate, Features& corners) {
+  if (camera.readout_s == 0.0) return;
+  for (int n = 0; n < corners.size(); ++n) {
+    const auto bearing = BearingInMidFrame(corners.keypoints_px[n], camera, rate);
+    if (!bearing) continue;
+    corners.bearings[n] = *bearing;
+    if (const auto moved = camera.Project(*bearing)) corners.keypoints_px[n] = *moved;
+  }
+}
+
 }  // namespace rotslam

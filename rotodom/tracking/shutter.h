@@ -5,6 +5,7 @@
 #include <Eigen/Core>
 
 #include "rotodom/camera/camera.h"
+#include "rotodom/features/features.h"
 
 namespace rotslam {
 
@@ -18,5 +19,10 @@ std::optional<Eigen::Vector3d> BearingInMidFrame(
     const Camera& camera,
     const Eigen::Vector3d& rate,
     const Eigen::Vector2d& flow_px_per_s = Eigen::Vector2d::Zero());
+
+/// Moves corners to where they would be had their rows been exposed in the middle of the frame;
+/// those without a bearing stay.
+/// @param rate  as above.
+void MoveToMidFrame(const Camera& camera, const Eigen::Vector3d& rate, Features& corners);
 
 }  // namespace rotslam

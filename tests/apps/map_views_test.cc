@@ -9,6 +9,8 @@
 #include <gtest/gtest.h>
 #include <opencv2/imgcodecs.hpp>
 
+#include "rotodom/tracking/shutter.h"
+#include "tests/ba/ba_scene.h"
 #include "tests/output/temporary_folder.h"
 
 namespace rotslam {
@@ -83,6 +85,32 @@ TEST(SetMotions, TakesThemFromTheFramesAround) {
     const bool has_place = frame != FrameId{3};
     EXPECT_LT((view.velocity - (has_place ? velocity : Eigen::Vector3d::Zero())).norm(), 1e-9);
   }
+}
+
+TEST(DescribeViews, FindsCornersAsAGlobalShutterSeesThem) {
+  const Camera global = BaCamera();
+  cv::Mat image(global.height, global.width, CV_8U);
+  cv::RNG random(3);
+  for (int row = 0; row < image.rows; row += 20) {
+    for (int column = 0; column < image.cols; column += 20) {
+      image(cv::Rect(column, row, 20, 20) & cv::Rect({}, image.size())) = random.uniform(0, 256);
+    }
+  }
+  MapViews views;
+  views[FrameId{7}] = MakeMapView(image);
+  views[FrameId{7}].rate = {0.0, 0.9, 0.0};
+  const Features corners = DescribeViews(views, global, {}, 1).at(FrameId{7});
+  EXPECT_EQ(corners.frame, FrameId{7});
+  EXPECT_GT(corners.size(), 100);
+  EXPECT_EQ(corners.descriptors.rows, corners.size());
+  Camera rolling = global;
+  rolling.readout_s = 0.03;
+  const Features moved = DescribeViews(views, rolling, {}, 1).at(FrameId{7});
+  ASSERT_EQ(moved.size(), corners.size());
+  Features expected = corners;
+  MoveToMidFrame(rolling, views[FrameId{7}].rate, expected);
+  EXPECT_EQ(moved.keypoints_px, expected.keypoints_px);
+  EXPECT_NE(moved.keypoints_px, corners.keypoints_px);
 }
 
 }  // namespace

@@ -148,9 +148,11 @@ class TwoComponents : public testing::Test {
 TEST_F(TwoComponents, BecomeOneThatExplainsMore) {
   ASSERT_EQ(refined_.components.size(), 2U);
   const std::vector<BundleResult> parts = refined_.bundles;
+  const int num_seen = NumObservations(tracks_);
   const std::set<FrameId> moved =
-      RefineRelocalised({WholeMap({0.3, 0.0, 0.2})}, tracks_, {}, {}, nullptr, refined_);
+      RefineRelocalised({WholeMap({0.3, 0.0, 0.2})}, {}, {}, nullptr, tracks_, refined_);
   EXPECT_EQ(moved.size(), 10U);
+  EXPECT_EQ(NumObservations(tracks_), num_seen + static_cast<int>(common_.size()));
   ASSERT_EQ(refined_.components.size(), 1U);
   ASSERT_EQ(refined_.bundles.size(), 1U);
   EXPECT_EQ(refined_.components[0].keyframes.size(), 30U);
@@ -164,7 +166,9 @@ TEST_F(TwoComponents, StayWhereTheOneExplainsLess) {
     if (frame.value >= kFirstLate) rotation = Rotation::Exp({0.0, 0.05 * frame.value, 0.0});
   }
   const std::vector<BundleResult> parts = refined_.bundles;
-  EXPECT_TRUE(RefineRelocalised({wrong}, tracks_, {}, {}, nullptr, refined_).empty());
+  const int num_seen = NumObservations(tracks_);
+  EXPECT_TRUE(RefineRelocalised({wrong}, {}, {}, nullptr, tracks_, refined_).empty());
+  EXPECT_EQ(NumObservations(tracks_), num_seen);
   EXPECT_EQ(refined_.components.size(), 2U);
   ASSERT_EQ(refined_.bundles.size(), 2U);
   ExpectEffortBeside(parts);

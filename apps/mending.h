@@ -1,0 +1,46 @@
+#pragma once
+
+#include <cstdint>
+#include <functional>
+#include <map>
+#include <set>
+#include <vector>
+
+#include "apps/refinement.h"
+#include "apps/relocalisation.h"
+#include "ba/bundle_adjustment.h"
+#include "rotodom/features/features.h"
+#include "rotodom/types/held_stretch.h"
+
+namespace rotslam {
+
+/// Described corners of some frames of a map, where a global shutter would see them; fewer where
+/// images cannot be had.
+using FrameDescription = std::function<std::map<FrameId, Features>(
+    const Reconstruction& map, const std::set<FrameId>& frames)>;
+
+/// What says that frames stand in a wrong place.
+struct MendingSources {
+  std::vector<Lookalike> lookalikes;
+  std::map<FrameId, Features> places;  // described corners of those and of some around them
+  FrameDescription describe;           // for frames that are no places; may be null
+  TrackCompletion complete;            // as RefineBundle takes it
+  std::vector<HeldStretch> held;       // as RefineComponents takes them
+};
+
+/// Moves keyframes to where others that look alike say that they are (see Relocalise), and adjusts
+/// the maps from there, as long as that makes them explain more. Keyframes next to those that move
+/// are looked at, too: what led the ones astray may mislead the others.
+/// @param tracks   as RefineComponents took them.
+/// @param refined  the maps; those that are mended are replaced.
+/// @return  the keyframes that stand elsewhere now; the same at any number of threads.
+/// Error:   starts of KITTI 00, the kitchen and EuRoC end in one minimum, see docs/method.md.
+/// Cost:    Relocalise's, and a bundle adjustment for each of up to three passes.
+std::set<FrameId> MendMaps(MendingSources sources,
+                           const std::vector<Track>& tracks,
+                           const RelocalisationOptions& options,
+                           std::uint64_t seed,
+                           const BundleOptions& bundle_options,
+                           RefinedComponents& refined);
+
+}  // namespace rotslam

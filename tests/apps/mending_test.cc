@@ -1,0 +1,105 @@
+#include "apps/mending.h"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include "tests/apps/walk_scene.h"
+
+namespace rotslam {
+namespace {
+
+using ::testing::Contains;
+using ::testing::ElementsAre;
+
+// A walk whose late frames have been adjusted in a wrong place, one of them looking like an early
+// one. Corners of the last ones are not known before somebody asks.
+class MendMapsTest : public testing::Test {
+ protected:
+  static constexpr int kFirstAsked = 12;
+
+  MendMapsTest() {
+    map_ = walk_.LateMoved(kAway);
+    BundleProblem problem;
+    problem.camera = walk_.camera;
+    problem.start = map_;
+    BundleOptions options;
+    options.lens.refine_distortion = false;
+    refined_.bundles.push_back(RefineBundle(problem, options));
+    refined_.components.emplace_back();
+    for (const auto& [frame, center] : map_.center_in_world) {
+      refined_.components[0].keyframes.insert(frame);
+    }
+    refined_.camera = walk_.camera;
+    sources_.lookalikes = {{FrameId{11}, FrameId{8}}};
+    for (const auto& [frame, place] : walk_.places) {
+      if (frame.value < kFirstAsked) sources_.places[frame] = place;
+    }
+  }
+
+  void DescribeWhenAsked() {
+    sources_.describe = [this](const Reconstruction& map, const std::set<FrameId>& frames) {
+      asked_.push_back(frames);
+      std::map<FrameId, Features> described;
+      for (const FrameId frame : frames) {
+        EXPECT_TRUE(map.center_in_world.contains(frame));
+        described[frame] = walk_.places.at(frame);
+      }
+      return described;
+    };
+  }
+
+  std::set<FrameId> Mend() { return MendMaps(sources_, map_.tracks, {}, 0, {}, refined_); }
+
+  // Observations of early points in late frames that had no described corners.
+  int NumFoundInLast() const {
+    int count = 0;
+    for (const Track& track : refined_.bundles[0].reconstruction.tracks) {
+      if (track.id.value >= kNumPoints) continue;
+      for (const Observation& observation : track.observations) {
+        count += observation.frame.value >= kFirstAsked ? 1 : 0;
+      }
+    }
+    return count;
+  }
+
+  Walk walk_;
+  Reconstruction map_;
+  RefinedComponents refined_;
+  MendingSources sources_;
+  std::vector<std::set<FrameId>> asked_;
+};
+
+TEST_F(MendMapsTest, LooksForFramesWithoutDescriptionWhereOthersMove) {
+  DescribeWhenAsked();
+  EXPECT_EQ(Mend().size(), std::size_t{kNumFrames - kFirstLate});
+  EXPECT_THAT(asked_, ElementsAre(std::set<FrameId>{FrameId{12}, FrameId{13}}));
+  EXPECT_GT(NumFoundInLast(), 50);
+  const Reconstruction& mended = refined_.bundles[0].reconstruction;
+  for (const auto& [frame, center] : walk_.truth.center_in_world) {
+    EXPECT_LT((mended.center_in_world.at(frame) - center).norm(), 0.05) << frame.value;
+  }
+}
+
+TEST_F(MendMapsTest, AsksForFramesBesideThoseThatMove) {
+  DescribeWhenAsked();
+  sources_.places.erase(FrameId{9});  // stands right
+  Mend();
+  ASSERT_FALSE(asked_.empty());
+  EXPECT_THAT(asked_[0], Contains(FrameId{9}));
+}
+
+TEST_F(MendMapsTest, DoesWithoutImages) {
+  EXPECT_EQ(Mend().size(), std::size_t{kNumFrames - kFirstLate});
+  EXPECT_EQ(NumFoundInLast(), 0);
+}
+
+TEST_F(MendMapsTest, AsksForNothingWhereAllStandsRight) {
+  DescribeWhenAsked();
+  Mend();
+  asked_.clear();
+  EXPECT_TRUE(Mend().empty());
+  EXPECT_TRUE(asked_.empty());
+}
+
+}  // namespace
+}  // namespace rotslam
