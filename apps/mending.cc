@@ -8,55 +8,70 @@
 namespace rotslam {
 namespace {
 
-// The frames that have moved, and those next to them.
-std::set<FrameId> DoubtfulFrames(const RelocalisedMap& map) {
+// A frame and those next to it.
+std::set<FrameId> Around(FrameId frame, const CenterMap& frames) {
   constexpr int kAround = 2;
-  const CenterMap& frames = map.center_in_world;
+  std::set<FrameId> around;
+  auto from = frames.find(frame);
+  auto to = std::next(from);
+  for (int k = 0; k < kAround && from != frames.begin(); ++k) --from;
+  for (int k = 0; k < kAround && to != frames.end(); ++k) ++to;
+  for (; from != to; ++from) around.insert(from->first);
+  return around;
+}
+
+// Those that have moved, and those next to them.
+std::set<FrameId> DoubtfulFrames(const RelocalisedMap& map) {
   std::set<FrameId> doubtful;
-  for (const FrameId frame : map.moved) {
-    auto from = frames.find(frame);
-    auto to = std::next(from);
-    for (int k = 0; k < kAround && from != frames.begin(); ++k) --from;
-    for (int k = 0; k < kAround && to != frames.end(); ++k) ++to;
-    for (; from != to; ++from) doubtful.insert(from->first);
-  }
+  for (const FrameId frame : map.moved) doubtful.merge(Around(frame, map.center_in_world));
   return doubtful;
 }
 
-// Describes the doubtful frames that are no places yet; whether there are any.
-bool DescribeDoubtful(const std::vector<RelocalisedMap>& changed, MendingSources& sources) {
-  if (!sources.describe) return false;
-  bool has_more = false;
-  for (const RelocalisedMap& map : changed) {
-    std::set<FrameId> frames = DoubtfulFrames(map);
-    std::erase_if(frames, [&](FrameId frame) { return sources.places.contains(frame); });
-    if (frames.empty()) continue;
-    Reconstruction poses;
-    poses.cam_from_world = map.cam_from_world;
-    poses.center_in_world = map.center_in_world;
-    sources.places.merge(sources.describe(poses, frames));
-    has_more = true;
+// Describes the doubtful frames that are no places yet.
+void DescribeDoubtful(const RelocalisedMap& map, MendingSources& sources) {
+  std::set<FrameId> frames = DoubtfulFrames(map);
+  std::erase_if(frames, [&](FrameId frame) { return sources.places.contains(frame); });
+  if (frames.empty() || !sources.describe) return;
+  Reconstruction poses;
+  poses.cam_from_world = map.cam_from_world;
+  poses.center_in_world = map.center_in_world;
+  sources.places.merge(sources.describe(poses, frames));
+}
+
+// Has the doubtful frames compared with what looks like those that have moved next to them.
+void CompareDoubtful(const RelocalisedMap& map, MendingSources& sources) {
+  std::map<FrameId, std::set<FrameId>> matches;  // that stand, of frames that have moved
+  for (const auto& [frame, match] : sources.lookalikes) {
+    if (map.moved.contains(frame) && !map.moved.contains(match)) matches[frame].insert(match);
+    if (map.moved.contains(match) && !map.moved.contains(frame)) matches[match].insert(frame);
   }
-  return has_more;
+  std::set<std::pair<FrameId, FrameId>> pairs;
+  for (const auto& [moved, alike] : matches) {
+    for (const FrameId frame : Around(moved, map.center_in_world)) {
+      for (const FrameId match : alike) pairs.emplace(frame, match);
+    }
+  }
+  for (const auto& [frame, match] : sources.lookalikes) pairs.erase({frame, match});
+  for (const auto& [frame, match] : pairs) sources.lookalikes.push_back({frame, match});
 }
 
 }  // namespace
 
 std::set<FrameId> MendMaps(MendingSources sources,
-                           const std::vector<Track>& tracks,
+                           const Camera& calibrated,
+                           std::vector<Track> tracks,
                            const RelocalisationOptions& options,
                            std::uint64_t seed,
                            const BundleOptions& bundle_options,
                            RefinedComponents& refined) {
   // Where some stand right, others are seen to stand wrong.
   constexpr int kMaxPasses = 3;
-  std::vector<Track> seen = WithBearingsOf(refined.camera, tracks);
   PlaceMatches places(sources.places, refined.camera);
   const auto relocalise = [&]() {
     std::vector<const Reconstruction*> maps;
     for (const BundleResult& bundle : refined.bundles) maps.push_back(&bundle.reconstruction);
     return Relocalise(maps,
-                      seen,
+                      tracks,
                       places,
                       sources.lookalikes,
                       refined.camera,
@@ -67,9 +82,14 @@ std::set<FrameId> MendMaps(MendingSources sources,
   std::set<FrameId> moved;
   for (int pass = 0; pass < kMaxPasses; ++pass) {
     std::vector<RelocalisedMap> changed = relocalise();
-    if (DescribeDoubtful(changed, sources)) changed = relocalise();
-    const std::set<FrameId> now =
-        RefineRelocalised(changed, sources.held, bundle_options, sources.complete, seen, refined);
+    if (changed.empty()) break;
+    for (const RelocalisedMap& map : changed) {
+      DescribeDoubtful(map, sources);
+      CompareDoubtful(map, sources);
+    }
+    changed = relocalise();
+    const std::set<FrameId> now = RefineRelocalised(
+        changed, sources.held, calibrated, bundle_options, sources.complete, tracks, refined);
     if (now.empty()) break;
     moved.insert(now.begin(), now.end());
   }

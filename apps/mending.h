@@ -31,13 +31,15 @@ struct MendingSources {
 /// Moves keyframes to where others that look alike say that they are (see Relocalise), and adjusts
 /// the maps from there, as long as that makes them explain more. Keyframes next to those that move
 /// are looked at, too: what led the ones astray may mislead the others.
-/// @param tracks   as RefineComponents took them.
-/// @param refined  the maps; those that are mended are replaced.
+/// @param calibrated  the camera as it was given.
+/// @param tracks      as RefineComponents took them.
+/// @param refined     the maps; those that are mended are replaced.
 /// @return  the keyframes that stand elsewhere now; the same at any number of threads.
 /// Error:   starts of KITTI 00, the kitchen and EuRoC end in one minimum, see docs/method.md.
 /// Cost:    Relocalise's, and a bundle adjustment for each of up to three passes.
 std::set<FrameId> MendMaps(MendingSources sources,
-                           const std::vector<Track>& tracks,
+                           const Camera& calibrated,
+                           std::vector<Track> tracks,
                            const RelocalisationOptions& options,
                            std::uint64_t seed,
                            const BundleOptions& bundle_options,

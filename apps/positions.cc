@@ -322,6 +322,7 @@ PositionResult MapKeyframes(const Orientations& orientations,
     sources.complete = complete;
     sources.held = result.held;
     result.relocalised = MendMaps(std::move(sources),
+                                  camera,
                                   tracks,
                                   options.relocalisation,
                                   options.krot.seed,

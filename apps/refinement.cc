@@ -113,6 +113,12 @@ bool ExplainsMore(const BundleResult& bundle,
   return bundle.Usable() && explained(bundle.summary) > num_explained;
 }
 
+BundleOptions WithLensHeld(BundleOptions options) {
+  options.lens.refine_focal = options.lens.refine_distortion = false;
+  options.lens.refine_principal_point = false;
+  return options;
+}
+
 // What an adjustment took that led to the other one, or to nothing.
 void AddEffort(const BundleSummary& other, BundleSummary& summary) {
   summary.iterations += other.iterations;
@@ -159,9 +165,7 @@ RefinedComponents RefineComponents(const RotationMap& cam_from_world,
   refine(first, tracks, options);
   refined.camera = refined.bundles[first].camera;
   if (refined.components.size() == 1) return refined;
-  BundleOptions same_lens = options;
-  same_lens.lens.refine_focal = same_lens.lens.refine_distortion = false;
-  same_lens.lens.refine_principal_point = false;
+  const BundleOptions same_lens = WithLensHeld(options);
   const std::vector<Track> seen = WithBearingsOf(refined.camera, tracks);
   for (std::size_t k = 0; k < refined.components.size(); ++k) {
     if (k != first) refine(k, seen, same_lens);
@@ -171,26 +175,28 @@ RefinedComponents RefineComponents(const RotationMap& cam_from_world,
 
 std::set<FrameId> RefineRelocalised(const std::vector<RelocalisedMap>& maps,
                                     const std::vector<HeldStretch>& held,
+                                    const Camera& calibrated,
                                     BundleOptions options,
                                     const TrackCompletion& complete,
                                     std::vector<Track>& tracks,
                                     RefinedComponents& refined) {
   options.bridge.enabled = false;
-  options.lens.refine_focal = options.lens.refine_distortion = false;
-  options.lens.refine_principal_point = false;
   std::set<FrameId> moved;
   std::set<int> replaced;
   for (const RelocalisedMap& map : maps) {
     MapComponent component;
     for (const auto& [frame, center] : map.center_in_world) component.keyframes.insert(frame);
-    std::vector<Track> seen = WithSightings(map.sightings, tracks);
+    // Where frames stood in a wrong place the lens made up for it. Several maps have one lens.
+    const bool is_all = map.parts.size() == refined.components.size();
+    const Camera& camera = is_all ? calibrated : refined.camera;
+    std::vector<Track> seen = WithBearingsOf(camera, WithSightings(map.sightings, tracks));
     BundleResult bundle = RefineComponent(component,
                                           map.cam_from_world,
                                           map.center_in_world,
                                           seen,
                                           held,
-                                          refined.camera,
-                                          options,
+                                          camera,
+                                          is_all ? options : WithLensHeld(options),
                                           complete);
     BundleSummary& before = refined.bundles[LargestOf(map.parts, refined)].summary;
     if (!ExplainsMore(bundle, map.parts, refined)) {
@@ -200,9 +206,13 @@ std::set<FrameId> RefineRelocalised(const std::vector<RelocalisedMap>& maps,
     moved.insert(map.moved.begin(), map.moved.end());
     tracks = std::move(seen);
     for (const int part : map.parts) AddEffort(refined.bundles[part].summary, bundle.summary);
-    bundle.summary.lens_gain = before.lens_gain;
-    bundle.summary.lens_refined = before.lens_refined;
-    bundle.summary.lens_sigmas = before.lens_sigmas;
+    if (is_all) {
+      refined.camera = bundle.camera;
+    } else {
+      bundle.summary.lens_gain = before.lens_gain;
+      bundle.summary.lens_refined = before.lens_refined;
+      bundle.summary.lens_sigmas = before.lens_sigmas;
+    }
     // Components go by their first keyframe.
     const int first = *map.parts.begin();
     refined.bundles[first] = std::move(bundle);

@@ -39,17 +39,17 @@ RefinedComponents RefineComponents(const RotationMap& cam_from_world,
                                    const BundleOptions& options,
                                    const TrackCompletion& complete = nullptr);
 
-/// Bundle adjustment once more of the maps that Relocalise has changed, with the lens as it is.
-/// Those that explain more of the images then replace the components that they were made of. Their
-/// rounds, iterations and seconds count those of these components, too, and where a map is refused
-/// the component counts the map's.
-/// @param tracks   as Relocalise took them, with the bearings of `refined.camera`; get the
-/// sightings
-///                 of the maps that are kept.
-/// @param refined  what Relocalise was given.
+/// Bundle adjustment once more of the maps that Relocalise has changed; of one that is all there is
+/// with the lens, and else with the lens as it is. Those that explain more of the images then
+/// replace the components that they were made of. Their rounds, iterations and seconds count those
+/// of these components, too, and where a map is refused the component counts the map's.
+/// @param calibrated  the camera as it was given.
+/// @param tracks      as Relocalise took them; get the sightings of the maps that are kept.
+/// @param refined     what Relocalise was given.
 /// @return  the keyframes that stand elsewhere now.
 std::set<FrameId> RefineRelocalised(const std::vector<RelocalisedMap>& maps,
                                     const std::vector<HeldStretch>& held,
+                                    const Camera& calibrated,
                                     BundleOptions options,
                                     const TrackCompletion& complete,
                                     std::vector<Track>& tracks,

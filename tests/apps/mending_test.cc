@@ -48,7 +48,9 @@ class MendMapsTest : public testing::Test {
     };
   }
 
-  std::set<FrameId> Mend() { return MendMaps(sources_, map_.tracks, {}, 0, {}, refined_); }
+  std::set<FrameId> Mend() {
+    return MendMaps(sources_, walk_.camera, map_.tracks, {}, 0, {}, refined_);
+  }
 
   // Observations of early points in late frames that had no described corners.
   int NumFoundInLast() const {

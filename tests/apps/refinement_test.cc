@@ -149,8 +149,8 @@ TEST_F(TwoComponents, BecomeOneThatExplainsMore) {
   ASSERT_EQ(refined_.components.size(), 2U);
   const std::vector<BundleResult> parts = refined_.bundles;
   const int num_seen = NumObservations(tracks_);
-  const std::set<FrameId> moved =
-      RefineRelocalised({WholeMap({0.3, 0.0, 0.2})}, {}, {}, nullptr, tracks_, refined_);
+  const std::set<FrameId> moved = RefineRelocalised(
+      {WholeMap({0.3, 0.0, 0.2})}, {}, scene_.camera, {}, nullptr, tracks_, refined_);
   EXPECT_EQ(moved.size(), 10U);
   EXPECT_EQ(NumObservations(tracks_), num_seen + static_cast<int>(common_.size()));
   ASSERT_EQ(refined_.components.size(), 1U);
@@ -167,7 +167,8 @@ TEST_F(TwoComponents, StayWhereTheOneExplainsLess) {
   }
   const std::vector<BundleResult> parts = refined_.bundles;
   const int num_seen = NumObservations(tracks_);
-  EXPECT_TRUE(RefineRelocalised({wrong}, {}, {}, nullptr, tracks_, refined_).empty());
+  EXPECT_TRUE(
+      RefineRelocalised({wrong}, {}, scene_.camera, {}, nullptr, tracks_, refined_).empty());
   EXPECT_EQ(NumObservations(tracks_), num_seen);
   EXPECT_EQ(refined_.components.size(), 2U);
   ASSERT_EQ(refined_.bundles.size(), 2U);
