@@ -81,20 +81,27 @@ bool FrameFinder::IsOpen(const Lookalike& pair) const {
 
 std::optional<FoundFrame> FrameFinder::Find(const Lookalike& pair) const {
   std::vector<Sighted> recognised;
+  const auto is_clear = [](const std::optional<FoundFrame>& found) {
+    return found && (found->is_displaced || found->is_right);
+  };
   Recognise(pair.frame, pair.match, recognised);
   std::optional<FoundFrame> found = FindPose(pair.frame, MapOf(pair.match), recognised);
-  const bool alone = found && (found->is_displaced || found->is_right);
-  if (!alone) {
+  if (!is_clear(found)) {
     const std::size_t num_of_match = recognised.size();
     for (const FrameId neighbour : NeighboursOf(pair.match)) {
       if (neighbour != pair.frame) Recognise(pair.frame, neighbour, recognised);
     }
-    if (recognised.size() == num_of_match) return std::nullopt;
-    found = FindPose(pair.frame, MapOf(pair.match), recognised);
+    std::optional<FoundFrame> by_more;
+    if (recognised.size() > num_of_match) {
+      by_more = FindPose(pair.frame, MapOf(pair.match), recognised);
+    }
+    if (is_clear(by_more)) {
+      found = std::move(by_more);
+      found->by_neighbours = true;
+    }
   }
-  if (!found || !(found->is_displaced || found->is_right)) return std::nullopt;
+  if (!is_clear(found) && !(found && found->is_near)) return std::nullopt;
   found->match = pair.match;
-  found->by_neighbours = !alone;
   return found;
 }
 
@@ -195,6 +202,7 @@ std::optional<FoundFrame> FrameFinder::FindPose(FrameId frame,
   found.is_displaced = found.num_present + options_.min_gain_sigmas * std::sqrt(pose->num_inliers) <
                        pose->num_inliers;
   found.is_right = found.is_right && !found.is_displaced;
+  found.is_near = found.num_agreeing >= options_.min_inliers && !found.is_displaced;
   if (found.is_displaced) Describe(*pose, map, points, sightings, found);
   return found;
 }

@@ -55,6 +55,40 @@ void CompareDoubtful(const RelocalisedMap& map, MendingSources& sources) {
   for (const auto& [frame, match] : pairs) sources.lookalikes.push_back({frame, match});
 }
 
+// For each frame that tracks see but no map holds, if it is a place, one that holds nothing else.
+std::vector<Reconstruction> MapsOfLost(const std::vector<Track>& tracks,
+                                       const std::map<FrameId, Features>& places,
+                                       const RefinedComponents& refined) {
+  std::set<FrameId> lost;
+  for (const Track& track : tracks) {
+    for (const Observation& observation : track.observations) lost.insert(observation.frame);
+  }
+  for (const BundleResult& bundle : refined.bundles) {
+    for (const auto& [frame, center] : bundle.reconstruction.center_in_world) lost.erase(frame);
+  }
+  std::vector<Reconstruction> maps;
+  for (const FrameId frame : lost) {
+    if (!places.contains(frame)) continue;
+    Reconstruction& map = maps.emplace_back();
+    map.cam_from_world[frame] = Rotation();
+    map.center_in_world[frame] = Eigen::Vector3d::Zero();
+  }
+  return maps;
+}
+
+// The pairs, and the other way round where that may find a lost frame.
+std::vector<Lookalike> BothWays(std::vector<Lookalike> pairs,
+                                const std::vector<Reconstruction>& lost) {
+  const std::size_t num_pairs = pairs.size();
+  for (const Reconstruction& map : lost) {
+    const FrameId frame = map.center_in_world.begin()->first;
+    for (std::size_t k = 0; k < num_pairs; ++k) {
+      if (pairs[k].match == frame) pairs.push_back({frame, pairs[k].frame});
+    }
+  }
+  return pairs;
+}
+
 }  // namespace
 
 std::set<FrameId> MendMaps(MendingSources sources,
@@ -68,12 +102,14 @@ std::set<FrameId> MendMaps(MendingSources sources,
   constexpr int kMaxPasses = 3;
   PlaceMatches places(sources.places, refined.camera);
   const auto relocalise = [&]() {
+    const std::vector<Reconstruction> lost = MapsOfLost(tracks, sources.places, refined);
     std::vector<const Reconstruction*> maps;
     for (const BundleResult& bundle : refined.bundles) maps.push_back(&bundle.reconstruction);
+    for (const Reconstruction& map : lost) maps.push_back(&map);
     return Relocalise(maps,
                       tracks,
                       places,
-                      sources.lookalikes,
+                      BothWays(sources.lookalikes, lost),
                       refined.camera,
                       options,
                       seed,

@@ -30,7 +30,8 @@ struct MendingSources {
 
 /// Moves keyframes to where others that look alike say that they are (see Relocalise), and adjusts
 /// the maps from there, as long as that makes them explain more. Keyframes next to those that move
-/// are looked at, too: what led the ones astray may mislead the others.
+/// are looked at, too: what led the ones astray may mislead the others. Places that no map holds
+/// are found again in the same way.
 /// @param calibrated  the camera as it was given.
 /// @param tracks      as RefineComponents took them.
 /// @param refined     the maps; those that are mended are replaced.

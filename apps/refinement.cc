@@ -184,10 +184,13 @@ std::set<FrameId> RefineRelocalised(const std::vector<RelocalisedMap>& maps,
   std::set<FrameId> moved;
   std::set<int> replaced;
   for (const RelocalisedMap& map : maps) {
+    std::set<int> parts = map.parts;
+    parts.erase(parts.lower_bound(static_cast<int>(refined.components.size())), parts.end());
+    if (parts.empty()) continue;
     MapComponent component;
     for (const auto& [frame, center] : map.center_in_world) component.keyframes.insert(frame);
     // Where frames stood in a wrong place the lens made up for it. Several maps have one lens.
-    const bool is_all = map.parts.size() == refined.components.size();
+    const bool is_all = parts.size() == refined.components.size();
     const Camera& camera = is_all ? calibrated : refined.camera;
     std::vector<Track> seen = WithBearingsOf(camera, WithSightings(map.sightings, tracks));
     BundleResult bundle = RefineComponent(component,
@@ -198,14 +201,14 @@ std::set<FrameId> RefineRelocalised(const std::vector<RelocalisedMap>& maps,
                                           camera,
                                           is_all ? options : WithLensHeld(options),
                                           complete);
-    BundleSummary& before = refined.bundles[LargestOf(map.parts, refined)].summary;
-    if (!ExplainsMore(bundle, map.parts, refined)) {
+    BundleSummary& before = refined.bundles[LargestOf(parts, refined)].summary;
+    if (!ExplainsMore(bundle, parts, refined)) {
       AddEffort(bundle.summary, before);
       continue;
     }
     moved.insert(map.moved.begin(), map.moved.end());
     tracks = std::move(seen);
-    for (const int part : map.parts) AddEffort(refined.bundles[part].summary, bundle.summary);
+    for (const int part : parts) AddEffort(refined.bundles[part].summary, bundle.summary);
     if (is_all) {
       refined.camera = bundle.camera;
     } else {
@@ -214,10 +217,10 @@ std::set<FrameId> RefineRelocalised(const std::vector<RelocalisedMap>& maps,
       bundle.summary.lens_sigmas = before.lens_sigmas;
     }
     // Components go by their first keyframe.
-    const int first = *map.parts.begin();
+    const int first = *parts.begin();
     refined.bundles[first] = std::move(bundle);
     refined.components[first] = std::move(component);
-    replaced.insert(std::next(map.parts.begin()), map.parts.end());
+    replaced.insert(std::next(parts.begin()), parts.end());
   }
   for (auto part = replaced.rbegin(); part != replaced.rend(); ++part) {
     refined.bundles.erase(refined.bundles.begin() + *part);

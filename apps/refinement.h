@@ -43,6 +43,7 @@ RefinedComponents RefineComponents(const RotationMap& cam_from_world,
 /// with the lens, and else with the lens as it is. Those that explain more of the images then
 /// replace the components that they were made of. Their rounds, iterations and seconds count those
 /// of these components, too, and where a map is refused the component counts the map's.
+/// @param maps        parts beyond the components are those of frames that had no place.
 /// @param calibrated  the camera as it was given.
 /// @param tracks      as Relocalise took them; get the sightings of the maps that are kept.
 /// @param refined     what Relocalise was given.

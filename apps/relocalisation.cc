@@ -120,9 +120,9 @@ class Displaced {
   void Choose(const Reconstruction& map, const std::vector<const FoundFrame*>& found) {
     std::map<FrameId, double> agreeing;
     for (const FoundFrame* one : found) {
+      if (one->is_near) anchored_.insert(one->frame);
       if (!one->is_right) continue;
       agreeing[one->frame] += one->num_agreeing;
-      anchored_.insert(one->frame);
       if (!one->by_neighbours) agreeing[*one->match] += one->num_agreeing;
     }
     std::vector<const FoundFrame*> open;
@@ -206,7 +206,7 @@ class Displaced {
 
   const FrameFinder& finder_;
   std::set<FrameId> frames_;
-  std::set<FrameId> anchored_;  // a found pose says that they are right
+  std::set<FrameId> anchored_;  // a found pose says that they are near their place
   std::map<FrameId, Best> move_;
 };
 

@@ -19,21 +19,25 @@ class MendMapsTest : public testing::Test {
 
   MendMapsTest() {
     map_ = walk_.LateMoved(kAway);
-    BundleProblem problem;
-    problem.camera = walk_.camera;
-    problem.start = map_;
-    BundleOptions options;
-    options.lens.refine_distortion = false;
-    refined_.bundles.push_back(RefineBundle(problem, options));
-    refined_.components.emplace_back();
-    for (const auto& [frame, center] : map_.center_in_world) {
-      refined_.components[0].keyframes.insert(frame);
-    }
-    refined_.camera = walk_.camera;
+    Adjust(map_);
     sources_.lookalikes = {{FrameId{11}, FrameId{8}}};
     for (const auto& [frame, place] : walk_.places) {
       if (frame.value < kFirstAsked) sources_.places[frame] = place;
     }
+  }
+
+  void Adjust(const Reconstruction& start) {
+    BundleProblem problem;
+    problem.camera = walk_.camera;
+    problem.start = start;
+    BundleOptions options;
+    options.lens.refine_distortion = false;
+    refined_.bundles = {RefineBundle(problem, options)};
+    refined_.components = {{}};
+    for (const auto& [frame, center] : start.center_in_world) {
+      refined_.components[0].keyframes.insert(frame);
+    }
+    refined_.camera = walk_.camera;
   }
 
   void DescribeWhenAsked() {
@@ -93,6 +97,18 @@ TEST_F(MendMapsTest, AsksForFramesBesideThoseThatMove) {
 TEST_F(MendMapsTest, DoesWithoutImages) {
   EXPECT_EQ(Mend().size(), std::size_t{kNumFrames - kFirstLate});
   EXPECT_EQ(NumFoundInLast(), 0);
+}
+
+TEST_F(MendMapsTest, FindsPlacesThatNoMapHolds) {
+  // A pair is told the other way round.
+  sources_.lookalikes = {{FrameId{8}, FrameId{11}}};
+  Adjust(PartOf(map_, false));
+  EXPECT_EQ(Mend(), std::set<FrameId>{FrameId{11}});
+  ASSERT_EQ(refined_.bundles.size(), 1U);
+  EXPECT_TRUE(refined_.components[0].keyframes.contains(FrameId{11}));
+  const CenterMap& centers = refined_.bundles[0].reconstruction.center_in_world;
+  ASSERT_TRUE(centers.contains(FrameId{11}));
+  EXPECT_LT((centers.at(FrameId{11}) - walk_.truth.center_in_world.at(FrameId{11})).norm(), 0.05);
 }
 
 TEST_F(MendMapsTest, AsksForNothingWhereAllStandsRight) {

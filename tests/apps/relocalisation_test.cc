@@ -127,6 +127,22 @@ TEST(Relocalise, LeavesWhatIsRight) {
       RelocaliseIn(walk, {&walk.truth}, walk.truth.tracks, {{FrameId{12}, FrameId{8}}}).empty());
 }
 
+TEST(Relocalise, LeavesWhatIsNearItsPlaceWhenThoseBesideItMove) {
+  const Walk walk;
+  Reconstruction map = walk.LateMoved(kAway);
+  // Where it stands explains two thirds of what it sees to the limit of 4 px.
+  const FrameId near{13};
+  map.cam_from_world[near] = Rotation::Exp({0.0, 0.0, 0.014}) * walk.truth.cam_from_world.at(near);
+  map.center_in_world[near] = walk.truth.center_in_world.at(near);
+  const auto changed =
+      RelocaliseIn(walk,
+                   {&map},
+                   map.tracks,
+                   {{FrameId{12}, FrameId{8}}, {FrameId{11}, FrameId{8}}, {near, FrameId{8}}});
+  ASSERT_EQ(changed.size(), 1U);
+  EXPECT_EQ(changed[0].moved, (std::set<FrameId>{FrameId{10}, FrameId{11}, FrameId{12}}));
+}
+
 TEST(Relocalise, LeavesWhatOnlyLooksAlike) {
   Walk walk;
   const Reconstruction map = walk.LateMoved(kAway);
