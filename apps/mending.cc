@@ -27,19 +27,21 @@ std::set<FrameId> DoubtfulFrames(const RelocalisedMap& map) {
   return doubtful;
 }
 
-// Describes the doubtful frames that are no places yet.
-void DescribeDoubtful(const RelocalisedMap& map, MendingSources& sources) {
+// Describes the doubtful frames that are no places yet; whether there are any.
+bool DescribeDoubtful(const RelocalisedMap& map, MendingSources& sources) {
   std::set<FrameId> frames = DoubtfulFrames(map);
   std::erase_if(frames, [&](FrameId frame) { return sources.places.contains(frame); });
-  if (frames.empty() || !sources.describe) return;
+  if (frames.empty() || !sources.describe) return false;
   Reconstruction poses;
   poses.cam_from_world = map.cam_from_world;
   poses.center_in_world = map.center_in_world;
   sources.places.merge(sources.describe(poses, frames));
+  return true;
 }
 
-// Has the doubtful frames compared with what looks like those that have moved next to them.
-void CompareDoubtful(const RelocalisedMap& map, MendingSources& sources) {
+// Has the doubtful frames compared with what looks like those that have moved next to them; whether
+// there is anything to compare.
+bool CompareDoubtful(const RelocalisedMap& map, MendingSources& sources) {
   std::map<FrameId, std::set<FrameId>> matches;  // that stand, of frames that have moved
   for (const auto& [frame, match] : sources.lookalikes) {
     if (map.moved.contains(frame) && !map.moved.contains(match)) matches[frame].insert(match);
@@ -53,6 +55,7 @@ void CompareDoubtful(const RelocalisedMap& map, MendingSources& sources) {
   }
   for (const auto& [frame, match] : sources.lookalikes) pairs.erase({frame, match});
   for (const auto& [frame, match] : pairs) sources.lookalikes.push_back({frame, match});
+  return !pairs.empty();
 }
 
 // For each frame that tracks see but no map holds, if it is a place, one that holds nothing else.
@@ -118,12 +121,12 @@ std::set<FrameId> MendMaps(MendingSources sources,
   std::set<FrameId> moved;
   for (int pass = 0; pass < kMaxPasses; ++pass) {
     std::vector<RelocalisedMap> changed = relocalise();
-    if (changed.empty()) break;
+    bool has_more = false;
     for (const RelocalisedMap& map : changed) {
-      DescribeDoubtful(map, sources);
-      CompareDoubtful(map, sources);
+      has_more |= DescribeDoubtful(map, sources);
+      has_more |= CompareDoubtful(map, sources);
     }
-    changed = relocalise();
+    if (has_more) changed = relocalise();
     const std::set<FrameId> now = RefineRelocalised(
         changed, sources.held, calibrated, bundle_options, sources.complete, tracks, refined);
     if (now.empty()) break;
