@@ -100,7 +100,7 @@ std::optional<FoundFrame> FrameFinder::Find(const Lookalike& pair) const {
       found->by_neighbours = true;
     }
   }
-  if (!is_clear(found) && !(found && found->is_near)) return std::nullopt;
+  if (!found || !(found->is_displaced || found->is_near)) return std::nullopt;
   found->match = pair.match;
   return found;
 }

@@ -31,7 +31,7 @@ struct FoundFrame {
   int num_agreeing = 0;
   bool is_displaced = false;  // the present pose explains too little
   bool is_right = false;      // it explains as much, also of points that the frame is not tied to
-  bool is_near = false;       // it explains more of those than chance does
+  bool is_near = false;       // it explains more of those than chance does; so it does where right
   Similarity move;            // of the frame's surroundings, into the world of the points
   std::vector<std::pair<TrackId, Observation>> sightings;
 };

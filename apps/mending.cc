@@ -50,7 +50,9 @@ bool CompareDoubtful(const RelocalisedMap& map, MendingSources& sources) {
   std::set<std::pair<FrameId, FrameId>> pairs;
   for (const auto& [moved, alike] : matches) {
     for (const FrameId frame : Around(moved, map.center_in_world)) {
-      for (const FrameId match : alike) pairs.emplace(frame, match);
+      for (const FrameId match : alike) {
+        if (frame != match) pairs.emplace(frame, match);
+      }
     }
   }
   for (const auto& [frame, match] : sources.lookalikes) pairs.erase({frame, match});

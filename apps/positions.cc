@@ -3,8 +3,10 @@
 #include <algorithm>
 #include <array>
 #include <cstdio>
+#include <functional>
 #include <iterator>
 #include <set>
+#include <utility>
 
 #include "apps/map_views.h"
 #include "apps/mending.h"
