@@ -75,19 +75,6 @@ std::vector<bool> UsedFlags(const BundleState& state) {
   return flags;
 }
 
-// The round with its loss and its limit as wide as the residuals are (`loss_spreads`).
-BundleRound FittedToResiduals(BundleRound round,
-                              const BundleOptions& options,
-                              const BundleState& state) {
-  const double spread = std::max(kLeastSpread, ResidualSpread(state));
-  const auto narrow = [&](double spreads, double width) {
-    return spreads > 0.0 ? std::min(width, spreads * spread) : width;
-  };
-  round.loss_scale = narrow(options.loss_spreads, round.loss_scale);
-  round.max_error_px = narrow(options.limit_spreads, round.max_error_px);
-  return round;
-}
-
 // The rounds of one problem, one after the other.
 class Rounds {
  public:
@@ -104,6 +91,26 @@ class Rounds {
     const bool is_first = result_.summary.rounds.empty();
     Minimise(name, round, start, state);
     if (good_ && is_first) result_.summary.before = before;
+  }
+
+  // The fine round with its loss and its limit as wide as the residuals are (`loss_spreads`).
+  BundleRound FineFor(const BundleState& state) const {
+    const double spread = std::max(kLeastSpread, ResidualSpread(state));
+    const auto narrow = [&](double spreads, double width) {
+      return spreads > 0.0 ? std::min(width, spreads * spread) : width;
+    };
+    BundleRound round = options_.fine;
+    round.loss_scale = narrow(options_.loss_spreads, round.loss_scale);
+    round.max_error_px = narrow(options_.limit_spreads, round.max_error_px);
+    return round;
+  }
+
+  // Once more with a narrower loss and limit, if the residuals of the round before ask for them.
+  void Narrow(const std::string& name, BundleState& state) {
+    const BundleRound round = FineFor(state);
+    if (round.loss_scale < last_.loss_scale || round.max_error_px < last_.max_error_px) {
+      Run(name, round, state);
+    }
   }
 
   // Classifies and minimises until classification changes next to nothing.
@@ -327,22 +334,21 @@ BundleResult RefineBundle(const BundleProblem& problem,
   rounds.Run("bridge", options.bridge, preparing);
   rounds.Run("coarse", options.coarse, preparing);
   rounds.TryLens(options.coarse, preparing);
-  rounds.Run("fine", options.fine, preparing);
-  BundleRound close = FittedToResiduals(options.fine, options, preparing);
-  if (part) TakeCameras(*part, state);
+  rounds.Run("fine", rounds.FineFor(preparing), preparing);
   // What support is asked of.
   std::optional<BundleState> given;
   if (complete && rounds.good()) {
+    if (part) TakeCameras(*part, state);
     ClassifyAll(options.fine, Placement::kAnywhere, options, state);
     given = state;
     result.summary.num_completed = Complete(complete, state);
     if (part) part = WithSomeTracks(state, options.preparing_observations);
-    BundleState& completed = part ? *part : state;
-    rounds.Run("completed", options.coarse, completed);
-    rounds.Run("completed", options.fine, completed);
-    close = FittedToResiduals(options.fine, options, completed);
-    if (part) TakeCameras(*part, state);
+    rounds.Run("completed", options.coarse, preparing);
+    rounds.Run("completed", rounds.FineFor(preparing), preparing);
   }
+  rounds.Narrow("narrow", preparing);
+  const BundleRound close = rounds.FineFor(preparing);
+  if (part) TakeCameras(*part, state);
   rounds.Close(close, part ? Placement::kAnywhere : Placement::kNearby, state);
 
   BundleSummary& summary = result.summary;

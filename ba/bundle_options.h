@@ -94,24 +94,24 @@ struct BundleOptions {
   // what little there is left to mend, the long waves in which a way bends.
   BundleRound fine = {
       .max_error_px = 2.0, .max_iterations = 50, .initial_radius = 1e8, .function_tolerance = 1e-5};
-  // The three rounds take tracks at random until every frame has so many observations: enough to
-  // say where cameras are, at a third of the time; what closes takes all. 0: all from the start.
-  // The longest tracks would do worse: they are those that the lens' errors and the tracker's drift
-  // bend most.
+  // What comes before closing takes tracks at random until every frame has so many observations:
+  // enough to say where cameras are, at a third of the time; what closes takes all. 0: all from the
+  // start. The longest tracks would do worse: they are those that the lens' errors and the
+  // tracker's drift bend most.
   int preparing_observations = 300;
   // Keypoints are often better than their sigma says, and what is far out for them are tracks that
-  // drift. So once the fine round's residuals are known all tracks close with it: the loss leaves
-  // the quadratic at this many spreads, and observations are kept within that many, where that is
-  // less than the round allows. A spread is the median residual, in sigmas, freed of what points
-  // take off by fitting. On simulated walks and drives errors fall to 0.3 to 0.9 of those with the
-  // round's own widths; where residuals are as wide as sigma_px says nothing changes. A limit alone
-  // needs 4 spreads for that, and EuRoC then loses 3 %. The closer the two are, the less is left
-  // for an adjustment without a loss: COLMAP's takes 1.4 % off the cost of KITTI 00, with 2 and 6
-  // spreads 3.8 %. 0: as the round has it.
+  // drift. So from the fine round on the loss leaves the quadratic at this many spreads of the
+  // residuals that the round before has left, and observations are kept within that many, where
+  // that is less than the round allows. A spread is the median residual, in sigmas, freed of what
+  // points take off by fitting. On simulated walks and drives errors fall to 0.3 to 0.9 of those
+  // with the round's own widths; where residuals are as wide as sigma_px says nothing changes. A
+  // limit alone needs 4 spreads for that, and EuRoC then loses 3 %. The closer the two are, the
+  // less is left for an adjustment without a loss: COLMAP's takes 1.4 % off the cost of KITTI 00,
+  // with 2 and 6 spreads 3.8 %. 0: as the round has it.
   double loss_spreads = 3.0;
   double limit_spreads = 5.0;
-  // This is repeated, so many times at most, until classification changes less than this share of
-  // the observations: then the result does not depend on where it started.
+  // Closing is repeated, so many times at most, until classification changes less than this share
+  // of the observations: then the result does not depend on where it started.
   int max_close_rounds = 5;
   double max_changed_share = 5e-4;
   // false holds the rotations in every round: they come out bit by bit as they went in.
