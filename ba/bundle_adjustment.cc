@@ -106,11 +106,14 @@ class Rounds {
   }
 
   // Once more with a narrower loss and limit, if the residuals of the round before ask for them.
-  void Narrow(const std::string& name, BundleState& state) {
+  // @return  the fine round for what it leaves.
+  BundleRound Narrow(BundleState& state) {
     const BundleRound round = FineFor(state);
-    if (round.loss_scale < last_.loss_scale || round.max_error_px < last_.max_error_px) {
-      Run(name, round, state);
-    }
+    const bool is_narrower =
+        round.loss_scale < last_.loss_scale || round.max_error_px < last_.max_error_px;
+    if (!is_narrower) return round;
+    Run("narrow", round, state);
+    return FineFor(state);
   }
 
   // Classifies and minimises until classification changes next to nothing.
@@ -346,8 +349,7 @@ BundleResult RefineBundle(const BundleProblem& problem,
     rounds.Run("completed", options.coarse, preparing);
     rounds.Run("completed", rounds.FineFor(preparing), preparing);
   }
-  rounds.Narrow("narrow", preparing);
-  const BundleRound close = rounds.FineFor(preparing);
+  const BundleRound close = rounds.Narrow(preparing);
   if (part) TakeCameras(*part, state);
   rounds.Close(close, part ? Placement::kAnywhere : Placement::kNearby, state);
 
