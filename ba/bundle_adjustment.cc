@@ -108,12 +108,12 @@ class Rounds {
   // Once more with a narrower loss and limit, if the residuals of the round before ask for them.
   // @return  the fine round for what it leaves.
   BundleRound Narrow(BundleState& state) {
-    const BundleRound round = FineFor(state);
-    const bool is_narrower =
-        round.loss_scale < last_.loss_scale || round.max_error_px < last_.max_error_px;
-    if (!is_narrower) return round;
-    Run("narrow", round, state);
-    return FineFor(state);
+    BundleRound round = FineFor(state);
+    if (round.loss_scale < last_.loss_scale || round.max_error_px < last_.max_error_px) {
+      Run("narrow", round, state);
+      round = FineFor(state);
+    }
+    return round;
   }
 
   // Classifies and minimises until classification changes next to nothing.
