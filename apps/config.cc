@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <map>
 #include <numeric>
 #include <set>
@@ -35,8 +36,10 @@ std::size_t EditDistance(std::string_view a, std::string_view b) {
 std::string LastPart(const std::string& key) { return key.substr(key.rfind('.') + 1); }
 
 // Right name in the wrong group is one step more than right name, whatever the group is called.
-std::size_t KeyDistance(const std::string& key, const std::string& known) {
-  return std::min(EditDistance(key, known), EditDistance(LastPart(key), LastPart(known)) + 1);
+// Among equally near names comes first the one in the most similar group.
+std::pair<std::size_t, std::size_t> KeyDistance(const std::string& key, const std::string& known) {
+  const std::size_t whole = EditDistance(key, known);
+  return {std::min(whole, EditDistance(LastPart(key), LastPart(known)) + 1), whole};
 }
 
 // What OverrideOptions knows about its keys: options, and the groups they lie in.
@@ -61,13 +64,15 @@ struct KnownKeys {
     const std::string key = whole_key.substr(0, 100);
     std::vector<std::string> candidates = keys;
     candidates.insert(candidates.end(), groups.begin(), groups.end());
-    const auto nearest = std::min_element(
-        candidates.begin(), candidates.end(), [&](const std::string& a, const std::string& b) {
-          // Among equally near names, the one in the most similar group.
-          return std::pair(KeyDistance(key, a), EditDistance(key, a)) <
-                 std::pair(KeyDistance(key, b), EditDistance(key, b));
-        });
-    return nearest == candidates.end() ? std::string() : *nearest;
+    std::string nearest;
+    std::pair least(std::numeric_limits<std::size_t>::max(), std::size_t{0});
+    for (const std::string& candidate : candidates) {
+      const std::pair distance = KeyDistance(key, candidate);
+      if (distance >= least) continue;
+      nearest = candidate;
+      least = distance;
+    }
+    return nearest;
   }
 
   std::string Unknown(const std::string& key) const {
