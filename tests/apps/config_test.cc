@@ -24,6 +24,7 @@ struct AllOptions {
   int max_features = 2000;
   std::uint64_t seed = 1;
   std::string engine = "clp";
+  MatchingOptions relocalisation;
   MatchingOptions matching;
 
   std::optional<std::string> Problem() const {
@@ -35,6 +36,7 @@ struct AllOptions {
     visit("max_features", max_features);
     visit("seed", seed);
     visit("engine", engine);
+    visit("relocalisation", relocalisation);
     visit("matching", matching);
   }
 };
@@ -75,6 +77,9 @@ TEST(LoadOptionsYaml, NamesTheNearestKnownKey) {
   EXPECT_THAT(ErrorOf("max_distance_px: 3\n"),
               HasSubstr("nearest one is \"matching.max_distance_px\""));
   EXPECT_THAT(ErrorOf("maching: {use_mutual: yes}\n"), HasSubstr("nearest one is \"matching\""));
+  // As near as the first group's option of that name: the more similar group decides.
+  EXPECT_THAT(ErrorOf("matchin.use_mutual: no\n"),
+              HasSubstr("nearest one is \"matching.use_mutual\""));
 }
 
 TEST(LoadOptionsYaml, NamesKeyValueAndType) {
