@@ -281,7 +281,12 @@ PositionResult MapKeyframes(const Orientations& orientations,
     progress.StartStage("turning in place", -1);
     const auto turning = FindTurning(
         camera, keyframe_rotations, tracks, ExplanationBy(result.bundles), bundle_options);
-    if (!turning) return std::nullopt;
+    if (!turning || !PairsAllowTurning(orientations.graph,
+                                       WithBearingsOf(turning->camera, all_tracks),
+                                       turning->camera.MeanFocal(),
+                                       options.rotodom.relative_rotation)) {
+      return std::nullopt;
+    }
     progress.EndStage("explains " + std::to_string(turning->num_observations) + " observations, " +
                       DescribeRounded(turning->camera));
     return TurningInPlace(result, *turning, orientations, options.rotodom.averaging);

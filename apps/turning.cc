@@ -2,6 +2,9 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstdint>
+#include <map>
+#include <utility>
 
 namespace rotslam {
 namespace {
@@ -20,17 +23,56 @@ constexpr double kMostObservations = 2.0 / 3.0;
 constexpr double kSampleShare = 0.8;
 // No calibration, guessed or not, is wrong by more than this factor.
 constexpr double kMaxFocalFactor = 2.0;
+// Pairs of views that tell whether the camera moves, and the share of them without a baseline that
+// a turn has at least.
+constexpr std::size_t kSampledEdges = 100;
+constexpr double kMinShareWithoutBaseline = 0.05;
 
 bool IsLensCredible(const Camera& given, const Camera& refined) {
   const double factor = refined.MeanFocal() / given.MeanFocal();
   return factor <= kMaxFocalFactor && factor >= 1.0 / kMaxFocalFactor;
 }
 
-std::vector<Track> SampleOf(const std::vector<Track>& tracks) {
-  const std::size_t stride = (tracks.size() + kSampledTracks - 1) / kSampledTracks;
-  std::vector<Track> sample;
-  for (std::size_t k = 0; k < tracks.size(); k += stride) sample.push_back(tracks[k]);
+// Evenly over all of them.
+template <class T>
+std::vector<T> SampleOf(const std::vector<T>& all, std::size_t max_size) {
+  const std::size_t stride = (all.size() + max_size - 1) / max_size;
+  std::vector<T> sample;
+  for (std::size_t k = 0; k < all.size(); k += stride) sample.push_back(all[k]);
   return sample;
+}
+
+// The observations of some frames, by track.
+using ObservationsOfFrames = std::map<FrameId, std::vector<std::pair<TrackId, const Observation*>>>;
+
+ObservationsOfFrames ObservationsOf(const std::vector<RelativeRotation>& edges,
+                                    const std::vector<Track>& tracks) {
+  ObservationsOfFrames observations;
+  for (const RelativeRotation& edge : edges) {
+    observations[edge.i];
+    observations[edge.j];
+  }
+  for (const Track& track : tracks) {
+    for (const Observation& observation : track.observations) {
+      const auto frame = observations.find(observation.frame);
+      if (frame != observations.end()) frame->second.emplace_back(track.id, &observation);
+    }
+  }
+  for (auto& [frame, seen] : observations) std::sort(seen.begin(), seen.end());
+  return observations;
+}
+
+std::vector<BearingPair> PairsOf(const RelativeRotation& edge,
+                                 const ObservationsOfFrames& observations) {
+  std::vector<BearingPair> pairs;
+  const auto& in_j = observations.at(edge.j);
+  auto next = in_j.begin();
+  for (const auto& [track, in_i] : observations.at(edge.i)) {
+    while (next != in_j.end() && next->first < track) ++next;
+    if (next == in_j.end()) break;
+    if (next->first == track) pairs.push_back({in_i->bearing, next->second->bearing});
+  }
+  return pairs;
 }
 
 }  // namespace
@@ -83,7 +125,7 @@ std::optional<TurningResult> FindTurning(const Camera& camera,
            explanation.redundancy > share * kMinShare * 2 * num_given &&
            Evidence(explanation, limit) > share * evidence_of_moving;
   };
-  const std::vector<Track> sample = SampleOf(tracks);
+  const std::vector<Track> sample = SampleOf(tracks, kSampledTracks);
   if (sample.size() < tracks.size()) {
     const double share = static_cast<double>(NumObservations(sample)) / num_given;
     const TurningResult sampled = RefineTurning(camera, cam_from_world, sample, options);
@@ -92,6 +134,25 @@ std::optional<TurningResult> FindTurning(const Camera& camera,
   TurningResult turning = RefineTurning(camera, cam_from_world, tracks, options);
   if (!turning.lens_refined || !is_believable(turning, 1.0)) return std::nullopt;
   return turning;
+}
+
+bool PairsAllowTurning(const ViewGraph& graph,
+                       const std::vector<Track>& tracks,
+                       double focal_px,
+                       const RelativeRotationOptions& options) {
+  constexpr std::uint64_t kSeed = 1;
+  const std::vector<RelativeRotation> edges = SampleOf(graph.edges(), kSampledEdges);
+  const ObservationsOfFrames observations = ObservationsOf(edges, tracks);
+  int num_asked = 0;
+  int num_without = 0;
+  for (const RelativeRotation& edge : edges) {
+    const auto estimate = EstimateRelativeRotation(
+        PairsOf(edge, observations), edge.j_from_i, focal_px, options, kSeed);
+    if (!estimate) continue;
+    ++num_asked;
+    num_without += estimate->rotation_only ? 1 : 0;
+  }
+  return num_without >= kMinShareWithoutBaseline * num_asked;
 }
 
 }  // namespace rotslam

@@ -128,5 +128,35 @@ TEST(FindTurning, GivesWayToPositionsThatExplainMore) {
           .has_value());
 }
 
+// Edges from each frame to the next two.
+ViewGraph GraphOf(const BaScene& scene) {
+  ViewGraph graph;
+  const RotationMap& rotations = scene.truth.cam_from_world;
+  for (const auto& [i, i_from_world] : rotations) {
+    for (int step = 1; step <= 2; ++step) {
+      const auto j = rotations.find(FrameId{i.value + step});
+      if (j == rotations.end()) continue;
+      graph.AddEdge({.i = i, .j = j->first, .j_from_i = j->second * i_from_world.Inverse()});
+    }
+  }
+  return graph;
+}
+
+TEST(PairsAllowTurning, OfACameraThatTurns) {
+  const BaScene scene = MakeScene(true);
+  EXPECT_TRUE(PairsAllowTurning(GraphOf(scene), scene.truth.tracks, scene.camera.MeanFocal(), {}));
+}
+
+TEST(PairsAllowTurning, NotOfOneThatMoves) {
+  const BaScene scene = MakeScene(false);
+  EXPECT_FALSE(PairsAllowTurning(GraphOf(scene), scene.truth.tracks, scene.camera.MeanFocal(), {}));
+}
+
+TEST(PairsAllowTurning, WhereNoPairSharesTracks) {
+  const BaScene scene = MakeScene(false);
+  EXPECT_TRUE(PairsAllowTurning(GraphOf(scene), {}, scene.camera.MeanFocal(), {}));
+  EXPECT_TRUE(PairsAllowTurning({}, scene.truth.tracks, scene.camera.MeanFocal(), {}));
+}
+
 }  // namespace
 }  // namespace rotslam
