@@ -1,5 +1,7 @@
 #include "ba/resection.h"
 
+#include <cmath>
+
 #include <gtest/gtest.h>
 
 #include "tests/ba/seen_points.h"
@@ -102,6 +104,22 @@ TEST(ResectFrame, ATightRotationPriorHoldsTheRotation) {
   EXPECT_GT(AngleErrorDeg(*free, view), 1e-3);
   EXPECT_LT((loose->center_in_world - free->center_in_world).norm(), 1e-7);
   EXPECT_LT(tight->covariance(0, 0), free->covariance(0, 0));
+}
+
+// A hundred standard deviations off, as a plane's second motion can be that frames see alone.
+TEST(ResectFrame, ARotationThatPointsRefuteCountsForNothing) {
+  const ResectionOptions options = {.max_iterations = 200};
+  const SeenPoints view = MakeView(CameraModel::kPinhole, 200, 0.3, 0.0);
+  ResectionStart start = NearStart(view, 0.2, 0.3);
+  start.rotation_covariance = std::pow(0.002 * kRadFromDeg, 2) * Eigen::Matrix3d::Identity();
+  const auto pose = ResectFrame(view.camera, view.sightings, start, options);
+  start.rotation_covariance.reset();
+  const auto by_points = ResectFrame(view.camera, view.sightings, start, options);
+  ASSERT_TRUE(pose);
+  ASSERT_TRUE(by_points);
+  EXPECT_LT(SquaredMahalanobis(*pose, view), 22.5);
+  EXPECT_EQ(pose->num_inliers, by_points->num_inliers);
+  EXPECT_LT((pose->covariance - by_points->covariance).norm(), 1e-6 * by_points->covariance.norm());
 }
 
 TEST(ResectFrame, SaysNoToTooLittle) {
