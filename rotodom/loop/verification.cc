@@ -16,6 +16,14 @@ double LargestSigmaDeg(const Eigen::Matrix3d& covariance) {
   return std::sqrt(eigen.eigenvalues()[2]) * kDegFromRad;
 }
 
+// What one old place says of where the view looks.
+struct Opinion {
+  Connection connection;
+  Rotation view_from_world;
+  double sigma_deg = 0.0;   // of the least certain axis
+  bool is_certain = false;  // else it can but confirm others
+};
+
 class Verifier {
  public:
   Verifier(const Features& view,
@@ -24,9 +32,11 @@ class Verifier {
            const VerificationTools& tools)
       : view_(view), camera_(camera), options_(options), tools_(tools) {}
 
-  // The edge from an old place; nullopt where too few matches agree.
-  std::optional<Connection> Connect(const Features& old_place,
-                                    const Rotation& predicted_view_from_old) const {
+  // By the edge from an old place; nullopt where too few matches agree.
+  std::optional<Opinion> Ask(const Features& old_place,
+                             const Rotation& old_from_world,
+                             const Rotation& predicted_view_from_world) const {
+    const Rotation predicted_view_from_old = predicted_view_from_world * old_from_world.Inverse();
     const Matches matches =
         MatchFeatures(old_place, view_, predicted_view_from_old, camera_, tools_.matching);
     std::vector<std::array<int, 2>> keypoints;
@@ -43,12 +53,17 @@ class Verifier {
     const int inliers = connection->edge.num_inliers;
     const double least = options_.min_inlier_ratio * static_cast<double>(keypoints.size());
     if (inliers < options_.min_inliers || inliers < least) return std::nullopt;
-    if (LargestSigmaDeg(connection->edge.covariance) > options_.max_sigma_deg) return std::nullopt;
+    Eigen::Matrix3d& covariance = connection->edge.covariance;
+    const double seen_sigma_deg = LargestSigmaDeg(covariance);
+    if (seen_sigma_deg > options_.max_witness_sigma_deg) return std::nullopt;
     if (camera_.readout_s > 0.0) {
       const double sigma = options_.shutter_sigma_deg * kRadFromDeg;
-      connection->edge.covariance += sigma * sigma * Eigen::Matrix3d::Identity();
+      covariance += sigma * sigma * Eigen::Matrix3d::Identity();
     }
-    return connection;
+    const double sigma_deg = LargestSigmaDeg(covariance);
+    const Rotation view_from_world = connection->edge.j_from_i * old_from_world;
+    const bool is_certain = seen_sigma_deg <= options_.max_sigma_deg;
+    return Opinion{*std::move(connection), view_from_world, sigma_deg, is_certain};
   }
 
  private:
@@ -58,15 +73,11 @@ class Verifier {
   const VerificationTools& tools_;
 };
 
-// What one old place says of where the view looks.
-struct Opinion {
-  Connection connection;
-  Rotation view_from_world;
-};
-
-// What may be wrong with the rotation around a short cycle; turns are wrong by this share.
+// What may be wrong with the rotation around a short cycle: this, or so many deviations of its
+// edges; turns are wrong by this share.
 struct CycleBound {
   double angle_deg = 0.0;
+  double sigmas = 0.0;
   double turn_error = 0.0;
 };
 
@@ -75,17 +86,20 @@ bool DoAgree(const Opinion& one, const Opinion& other, const CycleBound& bound) 
   const Rotation around = other.view_from_world * one.view_from_world.Inverse();
   const Rotation other_from_one =
       other.connection.edge.j_from_i.Inverse() * one.connection.edge.j_from_i;
-  return around.AngleDeg() <= bound.angle_deg + bound.turn_error * other_from_one.AngleDeg();
+  const double angle_deg =
+      std::max(bound.angle_deg, bound.sigmas * std::hypot(one.sigma_deg, other.sigma_deg));
+  return around.AngleDeg() <= angle_deg + bound.turn_error * other_from_one.AngleDeg();
 }
 
-// The opinions that agree with one of them, that being the one around which most matches do;
-// positions, the most certain one first.
+// The opinions that agree with a certain one, that being the one around which most matches do;
+// positions, the most certain one first. Empty where none is certain.
 std::vector<int> LargestAgreement(const std::vector<Opinion>& opinions, const CycleBound& bound) {
   const auto inliers = [&](int index) { return opinions[index].connection.edge.num_inliers; };
   const int count = static_cast<int>(opinions.size());
   std::vector<int> largest;
   int most_inliers = 0;
   for (int center = 0; center < count; ++center) {
+    if (!opinions[center].is_certain) continue;
     std::vector<int> agreeing = {center};
     int num_inliers = inliers(center);
     for (int other = 0; other < count; ++other) {
@@ -97,11 +111,12 @@ std::vector<int> LargestAgreement(const std::vector<Opinion>& opinions, const Cy
     most_inliers = num_inliers;
     largest = std::move(agreeing);
   }
-  const auto variance = [&](int index) {
-    return opinions[index].connection.edge.covariance.trace();
+  const auto doubt = [&](int index) {
+    const Opinion& opinion = opinions[index];
+    return std::pair(!opinion.is_certain, opinion.connection.edge.covariance.trace());
   };
   std::stable_sort(
-      largest.begin(), largest.end(), [&](int a, int b) { return variance(a) < variance(b); });
+      largest.begin(), largest.end(), [&](int a, int b) { return doubt(a) < doubt(b); });
   return largest;
 }
 
@@ -113,6 +128,9 @@ std::optional<std::string> VerificationOptions::Problem() const {
     return OutOfRange("min_inlier_ratio", min_inlier_ratio, "0 or more and below 1");
   }
   if (!(max_sigma_deg > 0.0)) return OutOfRange("max_sigma_deg", max_sigma_deg, "above 0");
+  if (!(max_witness_sigma_deg >= max_sigma_deg)) {
+    return OutOfRange("max_witness_sigma_deg", max_witness_sigma_deg, "at least max_sigma_deg");
+  }
   if (!(shutter_sigma_deg >= 0.0)) {
     return OutOfRange("shutter_sigma_deg", shutter_sigma_deg, "zero or more");
   }
@@ -122,6 +140,9 @@ std::optional<std::string> VerificationOptions::Problem() const {
   }
   if (sure_inliers < 0) return OutOfRange("sure_inliers", sure_inliers, "zero or more");
   if (!(max_cycle_deg > 0.0)) return OutOfRange("max_cycle_deg", max_cycle_deg, "above 0");
+  if (!(max_cycle_sigmas >= 0.0)) {
+    return OutOfRange("max_cycle_sigmas", max_cycle_sigmas, "zero or more");
+  }
   if (!(max_drift_deg > 0.0)) return OutOfRange("max_drift_deg", max_drift_deg, "above 0");
   if (!(max_drift_deg_per_sqrt_frame >= 0.0)) {
     return OutOfRange("max_drift_deg_per_sqrt_frame", max_drift_deg_per_sqrt_frame, "zero or more");
@@ -179,14 +200,10 @@ LoopEvidence VerifyLoop(const Features& view,
   std::vector<Opinion> opinions;
   for (const Features* old_place : old_places) {
     const Rotation& old_from_world = cam_from_world.at(old_place->frame);
-    auto edge = verifier.Connect(*old_place, present_view_from_world * old_from_world.Inverse());
-    if (!edge) {
-      // Neighbours are witnesses; where the likeliest place says no, they are not asked.
-      if (opinions.empty()) return evidence;
-      continue;
-    }
-    const Rotation view_from_world = edge->edge.j_from_i * old_from_world;
-    opinions.push_back({*std::move(edge), view_from_world});
+    auto opinion = verifier.Ask(*old_place, old_from_world, present_view_from_world);
+    if (opinion) opinions.push_back(*std::move(opinion));
+    // Neighbours are witnesses; where the likeliest place says no, they are not asked.
+    if (opinions.empty()) return evidence;
   }
   const auto scale_turns = [&](const Opinion& opinion) {
     return is_way_known
@@ -195,7 +212,9 @@ LoopEvidence VerifyLoop(const Features& view,
   };
   // The way to one place says how wrong turns are; that to the next one says the same.
   const double turn_error = std::abs(scale_turns(opinions.front()).turn_scale - 1.0);
-  const std::vector<int> agreeing = LargestAgreement(opinions, {options.max_cycle_deg, turn_error});
+  const std::vector<int> agreeing =
+      LargestAgreement(opinions, {options.max_cycle_deg, options.max_cycle_sigmas, turn_error});
+  if (agreeing.empty()) return evidence;
   const Opinion& best = opinions[agreeing.front()];
   evidence.match = best.connection.edge.i;
   evidence.num_inliers = best.connection.edge.num_inliers;
@@ -210,6 +229,7 @@ LoopEvidence VerifyLoop(const Features& view,
                       (num_inliers >= options.sure_inliers || num_consistent > 1) &&
                       (!is_way_known || evidence.way.angle_deg <= drift_deg);
   for (const int index : agreeing) {
+    if (!opinions[index].is_certain) break;
     evidence.connections.push_back(std::move(opinions[index].connection));
   }
   return evidence;

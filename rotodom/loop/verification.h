@@ -22,15 +22,19 @@ struct VerificationOptions {
   int min_inliers = 40;
   double min_inlier_ratio = 0.45;
   // An edge that is less certain of its rotation than this, one standard deviation of the least
-  // certain axis, tells nothing of drift.
+  // certain axis, tells nothing of drift. Up to the second bound it still confirms others: matches
+  // that agree are the same place, however little their points say of the rotation.
   double max_sigma_deg = 0.2;
+  double max_witness_sigma_deg = 0.6;
   // With a rolling shutter the rows of a moving camera see the scene from different places. From
   // frame to frame that is much the same; to an edge between two visits it adds this, on each axis.
   double shutter_sigma_deg = 0.3;
   // Rotations around short cycles, present place - old place - its neighbour, close to this. Two
   // views of a plane, or with little overlap, have several solutions; over three views only the
-  // right one is the same.
+  // right one is the same. Or within so many deviations of the two edges, where that is more: real
+  // edges between visits are four to eight times as far off as their matches alone can tell.
   double max_cycle_deg = 1.0;
+  double max_cycle_sigmas = 4.5;
   // Edges of one place that must agree so.
   int min_edges = 2;
   // Of edges at different frames, instead: these must look in directions that differ by this, since
@@ -53,8 +57,10 @@ struct VerificationOptions {
     visit("min_inliers", min_inliers);
     visit("min_inlier_ratio", min_inlier_ratio);
     visit("max_sigma_deg", max_sigma_deg);
+    visit("max_witness_sigma_deg", max_witness_sigma_deg);
     visit("shutter_sigma_deg", shutter_sigma_deg);
     visit("max_cycle_deg", max_cycle_deg);
+    visit("max_cycle_sigmas", max_cycle_sigmas);
     visit("min_edges", min_edges);
     visit("min_witness_deg", min_witness_deg);
     visit("sure_inliers", sure_inliers);

@@ -7,6 +7,7 @@
 #include <random>
 #include <utility>
 
+#include <Eigen/Eigenvalues>
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
@@ -216,7 +217,7 @@ TEST(VerifyLoop, RefusesWhatAgreesByChance) {
     }
     ExpectRefused(c.Verify());
     // The share of the matches tells it alone, their number does not.
-    c.options.max_sigma_deg = 180.0;
+    c.options.max_sigma_deg = c.options.max_witness_sigma_deg = 180.0;
     ExpectRefused(c.Verify());
     c.options.min_inlier_ratio = 0.0;
     most_inliers = std::max(most_inliers, c.Verify().num_inliers);
@@ -420,6 +421,36 @@ TEST(VerifyLoop, RefusesUncertainEdges) {
   ExpectRefused(c.Verify());
 }
 
+TEST(VerifyLoop, UncertainEdgesConfirmCertainOnes) {
+  Case c = TruePlace();
+  const LoopEvidence evidence = c.Verify();
+  ASSERT_EQ(evidence.connections.size(), 3);
+  const int most_certain = evidence.match.value;
+  // Between the first two.
+  double sigma_deg = 0.0;
+  for (int k = 0; k < 2; ++k) {
+    const Eigen::Matrix3d& covariance = evidence.connections[k].edge.covariance;
+    sigma_deg += 0.5 * std::sqrt(covariance.selfadjointView<Eigen::Upper>().eigenvalues()[2]);
+  }
+  c.options.max_sigma_deg = sigma_deg * kDegFromRad;
+  EXPECT_THAT(ConnectedFrames(c.Verify()), ElementsAre(most_certain));
+  c.options.max_witness_sigma_deg = c.options.max_sigma_deg;
+  ExpectRefused(c.Verify());
+}
+
+// With a rolling shutter edges between visits are less certain, and so are cycles of them.
+TEST(VerifyLoop, CyclesCloseToTheirDeviations) {
+  Case c = TruePlace();
+  c.num_consistent = 5;
+  c.Turn(0, 1.5);
+  c.Turn(2, -1.5);
+  ExpectRefused(c.Verify());
+  c.scene.camera.readout_s = 0.02;
+  EXPECT_THAT(ConnectedFrames(c.Verify()), testing::UnorderedElementsAre(0, 1, 2));
+  c.options.max_cycle_sigmas = 3.0;
+  ExpectRefused(c.Verify());
+}
+
 TEST(VerificationOptions, NamesTheFirstFieldOutOfRange) {
   EXPECT_FALSE(VerificationOptions{}.Problem());
   const auto problem = [](auto change) {
@@ -434,6 +465,11 @@ TEST(VerificationOptions, NamesTheFirstFieldOutOfRange) {
   EXPECT_TRUE(problem([](Options o) { o.max_sigma_deg = 0.0; }).starts_with("max_sigma_deg is 0"));
   EXPECT_TRUE(
       problem([](Options o) { o.max_cycle_deg = -1.0; }).starts_with("max_cycle_deg is -1"));
+  EXPECT_TRUE(problem([](Options o) {
+                o.max_witness_sigma_deg = 0.1;
+              }).starts_with("max_witness_sigma_deg is 0.1"));
+  EXPECT_TRUE(
+      problem([](Options o) { o.max_cycle_sigmas = -1.0; }).starts_with("max_cycle_sigmas is -1"));
   EXPECT_TRUE(problem([](Options o) { o.min_edges = 0; }).starts_with("min_edges is 0"));
   EXPECT_TRUE(
       problem([](Options o) { o.min_witness_deg = -1.0; }).starts_with("min_witness_deg is -1"));
