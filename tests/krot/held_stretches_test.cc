@@ -214,9 +214,10 @@ TEST(FindHeldStretches, TellsStandingStillFromTurning) {
   ViewGraph graph;
   for (RelativeRotation edge : path.graph.edges()) {
     edge.covariance = sigma * sigma * Eigen::Matrix3d::Identity();
-    // At rest for the first half, but for the noise.
+    // At rest for the first half, but for errors as large as those of real images.
+    const double error = 4.0 * sigma;
     const double turn = 0.02 * std::max(0, edge.j.value - std::max(20, edge.i.value));
-    edge.j_from_i = Rotation::Exp({sigma, turn - sigma, sigma});
+    edge.j_from_i = Rotation::Exp({error, turn - error, error});
     graph.AddEdge(edge);
   }
   path.graph = graph;
