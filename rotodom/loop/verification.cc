@@ -92,7 +92,7 @@ bool DoAgree(const Opinion& one, const Opinion& other, const CycleBound& bound) 
 }
 
 // The opinions that agree with a certain one, that being the one around which most matches do;
-// positions, the most certain one first. Empty where none is certain.
+// positions, the most certain one first.
 std::vector<int> LargestAgreement(const std::vector<Opinion>& opinions, const CycleBound& bound) {
   const auto inliers = [&](int index) { return opinions[index].connection.edge.num_inliers; };
   const int count = static_cast<int>(opinions.size());
@@ -210,11 +210,13 @@ LoopEvidence VerifyLoop(const Features& view,
                ? ScaleTurns(cam_from_world, opinion.connection.edge, options.max_turn_error)
                : WayAround();
   };
+  const auto certain = std::find_if(
+      opinions.begin(), opinions.end(), [](const Opinion& opinion) { return opinion.is_certain; });
+  if (certain == opinions.end()) return evidence;
   // The way to one place says how wrong turns are; that to the next one says the same.
-  const double turn_error = std::abs(scale_turns(opinions.front()).turn_scale - 1.0);
+  const double turn_error = std::abs(scale_turns(*certain).turn_scale - 1.0);
   const std::vector<int> agreeing =
       LargestAgreement(opinions, {options.max_cycle_deg, options.max_cycle_sigmas, turn_error});
-  if (agreeing.empty()) return evidence;
   const Opinion& best = opinions[agreeing.front()];
   evidence.match = best.connection.edge.i;
   evidence.num_inliers = best.connection.edge.num_inliers;

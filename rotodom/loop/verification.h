@@ -94,7 +94,8 @@ struct LoopEvidence {
   double angle_deg = 0.0;
   WayAround way;
   bool accepted = false;
-  // The edges that agree with each other, the most certain one first, accepted or not.
+  // The certain ones of the edges that agree with each other, the most certain one first, accepted
+  // or not.
   std::vector<Connection> connections;
 };
 

@@ -433,7 +433,9 @@ TEST(VerifyLoop, UncertainEdgesConfirmCertainOnes) {
     sigma_deg += 0.5 * std::sqrt(covariance.selfadjointView<Eigen::Upper>().eigenvalues()[2]);
   }
   c.options.max_sigma_deg = sigma_deg * kDegFromRad;
-  EXPECT_THAT(ConnectedFrames(c.Verify()), ElementsAre(most_certain));
+  const LoopEvidence confirmed = c.Verify();
+  EXPECT_TRUE(confirmed.accepted);
+  EXPECT_THAT(ConnectedFrames(confirmed), ElementsAre(most_certain));
   c.options.max_witness_sigma_deg = c.options.max_sigma_deg;
   ExpectRefused(c.Verify());
 }
