@@ -9,11 +9,12 @@ namespace rotslam {
 namespace {
 
 // A frame and those next to it.
-std::set<FrameId> Around(FrameId frame, const CenterMap& frames) {
+template <class Value>
+std::set<FrameId> Around(FrameId frame, const std::map<FrameId, Value>& frames) {
   constexpr int kAround = 2;
   std::set<FrameId> around;
-  auto from = frames.find(frame);
-  auto to = std::next(from);
+  auto from = frames.lower_bound(frame);
+  auto to = frames.upper_bound(frame);
   for (int k = 0; k < kAround && from != frames.begin(); ++k) --from;
   for (int k = 0; k < kAround && to != frames.end(); ++k) ++to;
   for (; from != to; ++from) around.insert(from->first);
@@ -60,11 +61,13 @@ bool CompareDoubtful(const RelocalisedMap& map, MendingSources& sources) {
   return !pairs.empty();
 }
 
-// For each frame that tracks see but no map holds, if it is a place, one that holds nothing else.
+// For each frame that tracks see, or that is outside, but that no map holds, if it is a place, one
+// that holds nothing else.
 std::vector<Reconstruction> MapsOfLost(const std::vector<Track>& tracks,
+                                       const std::set<FrameId>& outside,
                                        const std::map<FrameId, Features>& places,
                                        const RefinedComponents& refined) {
-  std::set<FrameId> lost;
+  std::set<FrameId> lost = outside;
   for (const Track& track : tracks) {
     for (const Observation& observation : track.observations) lost.insert(observation.frame);
   }
@@ -81,14 +84,30 @@ std::vector<Reconstruction> MapsOfLost(const std::vector<Track>& tracks,
   return maps;
 }
 
-// The pairs, and the other way round where that may find a lost frame.
-std::vector<Lookalike> BothWays(std::vector<Lookalike> pairs,
-                                const std::vector<Reconstruction>& lost) {
+// The pairs, and what else may find frames of one map in another one: those the other way round,
+// and the places before and behind them.
+std::vector<Lookalike> PairsAcross(const std::vector<const Reconstruction*>& maps,
+                                   const std::map<FrameId, Features>& places,
+                                   std::vector<Lookalike> pairs) {
+  std::map<FrameId, const Reconstruction*> map_of;
+  for (const Reconstruction* map : maps) {
+    for (const auto& [frame, center] : map->center_in_world) map_of[frame] = map;
+  }
+  // Whether there are points in which the frame may be found.
+  const auto is_across = [&](FrameId frame, FrameId match) {
+    const auto from = map_of.find(frame);
+    const auto to = map_of.find(match);
+    return from != map_of.end() && to != map_of.end() && from->second != to->second &&
+           !to->second->point_in_world.empty();
+  };
   const std::size_t num_pairs = pairs.size();
-  for (const Reconstruction& map : lost) {
-    const FrameId frame = map.center_in_world.begin()->first;
-    for (std::size_t k = 0; k < num_pairs; ++k) {
-      if (pairs[k].match == frame) pairs.push_back({frame, pairs[k].frame});
+  for (std::size_t k = 0; k < num_pairs; ++k) {
+    const auto [frame, match] = pairs[k];
+    if (is_across(match, frame)) pairs.push_back({match, frame});
+  }
+  for (const auto& [frame, map] : map_of) {
+    for (const FrameId other : Around(frame, places)) {
+      if (is_across(frame, other)) pairs.push_back({frame, other});
     }
   }
   return pairs;
@@ -107,14 +126,15 @@ std::set<FrameId> MendMaps(MendingSources sources,
   constexpr int kMaxPasses = 3;
   PlaceMatches places(sources.places, refined.camera);
   const auto relocalise = [&]() {
-    const std::vector<Reconstruction> lost = MapsOfLost(tracks, sources.places, refined);
+    const std::vector<Reconstruction> lost =
+        MapsOfLost(tracks, sources.outside, sources.places, refined);
     std::vector<const Reconstruction*> maps;
     for (const BundleResult& bundle : refined.bundles) maps.push_back(&bundle.reconstruction);
     for (const Reconstruction& map : lost) maps.push_back(&map);
     return Relocalise(maps,
                       tracks,
                       places,
-                      BothWays(sources.lookalikes, lost),
+                      PairsAcross(maps, sources.places, sources.lookalikes),
                       refined.camera,
                       options,
                       seed,

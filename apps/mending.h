@@ -23,6 +23,7 @@ using FrameDescription = std::function<std::map<FrameId, Features>(
 struct MendingSources {
   std::vector<Lookalike> lookalikes;
   std::map<FrameId, Features> places;  // described corners of those and of some around them
+  std::set<FrameId> outside;           // frames that no edge links with those of a map
   FrameDescription describe;           // for frames that are no places; may be null
   TrackCompletion complete;            // as RefineBundle takes it
   std::vector<HeldStretch> held;       // as RefineComponents takes them
@@ -30,8 +31,9 @@ struct MendingSources {
 
 /// Moves keyframes to where others that look alike say that they are (see Relocalise), and adjusts
 /// the maps from there, as long as that makes them explain more. Keyframes next to those that move
-/// are looked at, too: what led the ones astray may mislead the others. Places that no map holds
-/// are found again in the same way.
+/// are looked at, too: what led the ones astray may mislead the others. Places that no map holds,
+/// and maps apart from the others, are found in the same way, by what looks alike and by what comes
+/// before and behind them.
 /// @param calibrated  the camera as it was given.
 /// @param tracks      as RefineComponents took them.
 /// @param refined     the maps; those that are mended are replaced.

@@ -16,16 +16,18 @@
 
 namespace rotslam {
 
-void InterpolateUnconnected(const Orientations& orientations, RotationMap& rotations) {
+void InterpolateUnknown(const Orientations& orientations,
+                        const std::set<FrameId>& unknown,
+                        RotationMap& rotations) {
   if (orientations.given) return;
-  const auto connected = [&](FrameId frame) { return !orientations.graph.EdgesOf(frame).empty(); };
+  const auto known = [&](FrameId frame) { return !unknown.contains(frame); };
   for (auto entry = rotations.begin(); entry != rotations.end(); ++entry) {
-    if (connected(entry->first)) continue;
+    if (known(entry->first)) continue;
     auto before = entry;
-    while (before != rotations.begin() && !connected(before->first)) --before;
+    while (before != rotations.begin() && !known(before->first)) --before;
     auto after = entry;
-    while (after != rotations.end() && !connected(after->first)) ++after;
-    const bool has_before = connected(before->first);
+    while (after != rotations.end() && !known(after->first)) ++after;
+    const bool has_before = known(before->first);
     if (has_before && after != rotations.end()) {
       const double from_s = orientations.timestamps_s[before->first.value];
       const double to_s = orientations.timestamps_s[after->first.value];
@@ -238,7 +240,7 @@ Orientations FindOrientations(Input& input,
   }
   frames.Commit();
   for (const auto& [frame, rotation] : orientations.cam_from_world) {
-    orientations.num_predicted += orientations.graph.EdgesOf(frame).empty();
+    if (orientations.graph.EdgesOf(frame).empty()) orientations.unconnected.insert(frame);
   }
   if (input.given_rotations) {
     orientations.given = MatchGivenRotations(input.rotations_file,
@@ -248,7 +250,7 @@ Orientations FindOrientations(Input& input,
     orientations.cam_from_world = orientations.given->cam_from_world;
     orientations.covariance = orientations.given->covariance;
   }
-  InterpolateUnconnected(orientations, orientations.cam_from_world);
+  InterpolateUnknown(orientations, orientations.unconnected, orientations.cam_from_world);
   orientations.inlier_edges =
       CountInlierEdges(orientations.graph, orientations.cam_from_world, options.rotodom.averaging);
   if (!orientations.given) {
@@ -264,7 +266,8 @@ Orientations FindOrientations(Input& input,
     return orientations;
   }
   // The unreadable ones have had their warning.
-  if (const int count = orientations.num_predicted - orientations.num_unreadable; count > 0) {
+  const int num_unconnected = static_cast<int>(orientations.unconnected.size());
+  if (const int count = num_unconnected - orientations.num_unreadable; count > 0) {
     progress.Warn(std::to_string(count) +
                   (count == 1 ? " frame matches no other; its orientation is interpolated"
                               : " frames match no other; their orientations are interpolated"));

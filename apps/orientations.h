@@ -2,6 +2,7 @@
 
 #include <map>
 #include <optional>
+#include <set>
 #include <string>
 #include <vector>
 
@@ -26,7 +27,7 @@ struct Orientations : OdometryResult {
   // Set: `cam_from_world` and `covariance` are these, and only the edges are the images'.
   std::optional<GivenRotations> given;
   int num_unreadable = 0;
-  int num_predicted = 0;  // frames without an edge; their orientations are interpolated, or given
+  std::set<FrameId> unconnected;  // without an edge; their orientations are interpolated, or given
   int num_weak = 0;
   // Frames that match later frames but none before them: a new piece of the view-graph, whose turn
   // against the piece before is extrapolated.
@@ -61,9 +62,11 @@ Orientations FindOrientations(Input& input,
                               Progress& progress,
                               Checkpoint* checkpoint = nullptr);
 
-/// Gives the frames without an edge the orientation between those of the nearest frames in time
+/// Gives frames whose orientation is not known that between those of the nearest frames in time
 /// that have one; again once these have been refined. Given orientations stay.
-void InterpolateUnconnected(const Orientations& orientations, RotationMap& cam_from_world);
+void InterpolateUnknown(const Orientations& orientations,
+                        const std::set<FrameId>& unknown,
+                        RotationMap& cam_from_world);
 
 /// Standard deviation of every orientation whose covariance is known, rad: the root of the mean
 /// variance about its three axes, against the first frame.

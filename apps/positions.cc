@@ -15,6 +15,7 @@
 #include "output/cloud_outliers.h"
 #include "rotodom/averaging/anchors.h"
 #include "rotodom/completion/completion.h"
+#include "rotodom/types/disjoint_sets.h"
 #include "rotodom/types/similarity.h"
 
 namespace rotslam {
@@ -183,7 +184,7 @@ PositionResult TurningInPlace(const PositionResult& moving,
   PositionResult result;
   result.cam_from_world = FollowAnchors(
       orientations.graph, orientations.cam_from_world, turning.cam_from_world, options);
-  InterpolateUnconnected(orientations, result.cam_from_world);
+  InterpolateUnknown(orientations, orientations.unconnected, result.cam_from_world);
   result.camera = turning.camera;
   result.keyframes = moving.keyframes;
   result.keyframe_tracks = moving.keyframe_tracks;
@@ -239,6 +240,26 @@ FrameDescription DescriptionWith(const ViewReader& read,
   return [&, num_threads](const Reconstruction& map, const std::set<FrameId>& frames) {
     return DescribeViews(read(map, frames), camera, options, num_threads);
   };
+}
+
+// Frames of pieces of the view-graph that no map holds a frame of.
+std::set<FrameId> OutsideOfMaps(const Orientations& orientations,
+                                const RefinedComponents& refined) {
+  DisjointSets pieces;
+  for (const RelativeRotation& edge : orientations.graph.edges()) {
+    pieces.Join(edge.i.value, edge.j.value);
+  }
+  std::set<int> mapped;
+  for (const BundleResult& bundle : refined.bundles) {
+    for (const auto& [frame, center] : bundle.reconstruction.center_in_world) {
+      mapped.insert(pieces.Find(frame.value));
+    }
+  }
+  std::set<FrameId> outside;
+  for (const auto& [frame, rotation] : orientations.cam_from_world) {
+    if (!mapped.contains(pieces.Find(frame.value))) outside.insert(frame);
+  }
+  return outside;
 }
 
 // FindKeyframePositions from the tracks of all frames.
@@ -325,6 +346,7 @@ PositionResult MapKeyframes(const Orientations& orientations,
       sources.lookalikes.push_back({check.frame, check.match});
     }
     sources.places = orientations.places;
+    sources.outside = OutsideOfMaps(orientations, refined);
     sources.describe = DescriptionWith(read, refined.camera, options.rotodom.features, num_threads);
     sources.complete = complete;
     sources.held = result.held;
@@ -335,6 +357,7 @@ PositionResult MapKeyframes(const Orientations& orientations,
                                   options.krot.seed,
                                   bundle_options,
                                   refined);
+    result.keyframes.insert(result.relocalised.begin(), result.relocalised.end());
   }
   result.camera = refined.camera;
   for (std::size_t k = 0; k < refined.components.size(); ++k) {
@@ -404,7 +427,9 @@ PositionResult FindPositions(const Input& input,
   all_tracks = WithBearingsOf(result.camera, std::move(all_tracks));
   PlaceRemainingFrames(orientations, all_tracks, options, num_threads, result);
   // Their neighbours have moved a little since.
-  InterpolateUnconnected(orientations, result.cam_from_world);
+  std::set<FrameId> unknown = orientations.unconnected;
+  std::erase_if(unknown, [&](FrameId frame) { return result.map.cam_from_world.contains(frame); });
+  InterpolateUnknown(orientations, unknown, result.cam_from_world);
   progress.EndStage(std::to_string(result.num_resected) + " resected, " +
                     std::to_string(result.num_interpolated) + " interpolated");
 

@@ -335,7 +335,7 @@ RunSummary StartSummary(const std::string& command,
   summary.counts = {
       {"frames", count(orientations.timestamps_s.size())},
       {"unreadable_frames", std::int64_t{orientations.num_unreadable}},
-      {"frames_without_edge", std::int64_t{orientations.num_predicted}},
+      {"frames_without_edge", count(orientations.unconnected.size())},
       {"frames_with_weak_edge", std::int64_t{orientations.num_weak}},
       {"frames_searched_wide",
        count(std::count_if(orientations.reports.begin(),

@@ -56,6 +56,13 @@ class MendMapsTest : public testing::Test {
     return MendMaps(sources_, walk_.camera, map_.tracks, {}, 0, {}, refined_);
   }
 
+  static Features Blank(FrameId frame) {
+    Features place;
+    place.frame = frame;
+    place.descriptors = cv::Mat(0, 32, CV_8U);
+    return place;
+  }
+
   // Observations of early points.
   int NumFoundIn(FrameId frame) const {
     int count = 0;
@@ -113,15 +120,46 @@ TEST_F(MendMapsTest, DoesWithoutImages) {
 }
 
 TEST_F(MendMapsTest, FindsPlacesThatNoMapHolds) {
-  // A pair is told the other way round.
-  sources_.lookalikes = {{FrameId{8}, FrameId{11}}};
+  // A pair is told the other way round. The places next to it show nothing.
+  sources_.lookalikes = {{FrameId{8}, FrameId{12}}};
+  sources_.places[FrameId{12}] = walk_.places.at(FrameId{12});
+  for (const int blank : {9, 10, 11}) sources_.places[FrameId{blank}] = Blank(FrameId{blank});
   Adjust(PartOf(map_, false));
-  EXPECT_EQ(Mend(), std::set<FrameId>{FrameId{11}});
+  EXPECT_EQ(Mend(), std::set<FrameId>{FrameId{12}});
   ASSERT_EQ(refined_.bundles.size(), 1U);
-  EXPECT_TRUE(refined_.components[0].keyframes.contains(FrameId{11}));
+  EXPECT_TRUE(refined_.components[0].keyframes.contains(FrameId{12}));
+  const CenterMap& centers = refined_.bundles[0].reconstruction.center_in_world;
+  ASSERT_TRUE(centers.contains(FrameId{12}));
+  EXPECT_LT((centers.at(FrameId{12}) - walk_.truth.center_in_world.at(FrameId{12})).norm(), 0.05);
+}
+
+TEST_F(MendMapsTest, FindsFramesOutsideByThoseBeforeThem) {
+  sources_.lookalikes.clear();
+  for (Track& track : map_.tracks) {
+    std::erase_if(track.observations, [](const auto& one) { return one.frame == FrameId{11}; });
+  }
+  Adjust(PartOf(map_, false));
+  sources_.outside = {FrameId{11}};
+  EXPECT_THAT(Mend(), Contains(FrameId{11}));
+  ASSERT_EQ(refined_.bundles.size(), 1U);
   const CenterMap& centers = refined_.bundles[0].reconstruction.center_in_world;
   ASSERT_TRUE(centers.contains(FrameId{11}));
   EXPECT_LT((centers.at(FrameId{11}) - walk_.truth.center_in_world.at(FrameId{11})).norm(), 0.05);
+}
+
+TEST_F(MendMapsTest, JoinsMapsWhereOneFollowsTheOther) {
+  sources_.lookalikes.clear();
+  Adjust(PartOf(map_, true));
+  const RefinedComponents late = refined_;
+  Adjust(PartOf(map_, false));
+  refined_.components.push_back(late.components[0]);
+  refined_.bundles.push_back(late.bundles[0]);
+  EXPECT_EQ(Mend().size(), std::size_t{kNumFrames - kFirstLate});
+  ASSERT_EQ(refined_.bundles.size(), 1U);
+  const CenterMap& centers = refined_.bundles[0].reconstruction.center_in_world;
+  for (const auto& [frame, center] : walk_.truth.center_in_world) {
+    EXPECT_LT((centers.at(frame) - center).norm(), 0.05) << frame.value;
+  }
 }
 
 TEST_F(MendMapsTest, AsksForNothingWhereAllStandsRight) {

@@ -105,6 +105,17 @@ TEST_F(SharedData, EurocV101BehindABreak) {
   EXPECT_EQ(summary.at("counts").at("components"), 1);
 }
 
+// Begun later, one frame matches no other one. The map knows what it sees.
+TEST_F(SharedData, EurocV101WithAFrameThatMatchesNoOther) {
+  ROTSLAM_SKIP_WITHOUT("euroc_v101_keyframes");
+  ASSERT_NO_FATAL_FAILURE(Do("run", "euroc_v101_keyframes", {"--first=20"}));
+  const TrajectoryMetrics metrics =
+      Compare(Data("euroc_v101_keyframes/groundtruth_cam0_tum.txt"), Out() / "trajectory_tum.txt");
+  EXPECT_EQ(ReadSummary(Out()).at("counts").at("frames_without_edge"), 1);
+  EXPECT_LT(metrics.rpe1_deg, 0.85);  // 12.1 and 0.14 where its pose is interpolated
+  EXPECT_LT(metrics.ate_m.value_or(1e9), 0.04);
+}
+
 // From this start frame 56, which is no place, is led astray by what the tracker has mistaken.
 TEST_F(SharedData, EurocV101FromTheLeastLargestResidual) {
   ROTSLAM_SKIP_WITHOUT("euroc_v101_keyframes");
