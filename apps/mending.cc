@@ -61,13 +61,13 @@ bool CompareDoubtful(const RelocalisedMap& map, MendingSources& sources) {
   return !pairs.empty();
 }
 
-// For each frame that tracks see, or that is outside, but that no map holds, if it is a place, one
+// For each frame that tracks see, or that is apart, but that no map holds, if it is a place, one
 // that holds nothing else.
 std::vector<Reconstruction> MapsOfLost(const std::vector<Track>& tracks,
-                                       const std::set<FrameId>& outside,
+                                       const std::set<FrameId>& apart,
                                        const std::map<FrameId, Features>& places,
                                        const RefinedComponents& refined) {
-  std::set<FrameId> lost = outside;
+  std::set<FrameId> lost = apart;
   for (const Track& track : tracks) {
     for (const Observation& observation : track.observations) lost.insert(observation.frame);
   }
@@ -127,7 +127,7 @@ std::set<FrameId> MendMaps(MendingSources sources,
   PlaceMatches places(sources.places, refined.camera);
   const auto relocalise = [&]() {
     const std::vector<Reconstruction> lost =
-        MapsOfLost(tracks, sources.outside, sources.places, refined);
+        MapsOfLost(tracks, sources.apart, sources.places, refined);
     std::vector<const Reconstruction*> maps;
     for (const BundleResult& bundle : refined.bundles) maps.push_back(&bundle.reconstruction);
     for (const Reconstruction& map : lost) maps.push_back(&map);

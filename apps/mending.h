@@ -23,7 +23,7 @@ using FrameDescription = std::function<std::map<FrameId, Features>(
 struct MendingSources {
   std::vector<Lookalike> lookalikes;
   std::map<FrameId, Features> places;  // described corners of those and of some around them
-  std::set<FrameId> outside;           // frames that no edge links with those of a map
+  std::set<FrameId> apart;             // frames whose tracks do not place them in a map
   FrameDescription describe;           // for frames that are no places; may be null
   TrackCompletion complete;            // as RefineBundle takes it
   std::vector<HeldStretch> held;       // as RefineComponents takes them

@@ -15,7 +15,6 @@
 #include "output/cloud_outliers.h"
 #include "rotodom/averaging/anchors.h"
 #include "rotodom/completion/completion.h"
-#include "rotodom/types/disjoint_sets.h"
 #include "rotodom/types/similarity.h"
 
 namespace rotslam {
@@ -242,24 +241,28 @@ FrameDescription DescriptionWith(const ViewReader& read,
   };
 }
 
-// Frames of pieces of the view-graph that no map holds a frame of.
-std::set<FrameId> OutsideOfMaps(const Orientations& orientations,
-                                const RefinedComponents& refined) {
-  DisjointSets pieces;
-  for (const RelativeRotation& edge : orientations.graph.edges()) {
-    pieces.Join(edge.i.value, edge.j.value);
-  }
-  std::set<int> mapped;
+// Frames whose tracks show too few points of the maps to place them by; in a stretch their places
+// are known.
+std::set<FrameId> FramesApart(const std::vector<Track>& all_tracks,
+                              const RefinedComponents& refined,
+                              const PositionResult& result,
+                              int min_points) {
+  std::set<TrackId> known;
   for (const BundleResult& bundle : refined.bundles) {
-    for (const auto& [frame, center] : bundle.reconstruction.center_in_world) {
-      mapped.insert(pieces.Find(frame.value));
+    for (const auto& [track, point] : bundle.reconstruction.point_in_world) known.insert(track);
+  }
+  std::map<FrameId, int> num_points;
+  for (const Track& track : all_tracks) {
+    if (!known.contains(track.id)) continue;
+    for (const Observation& observation : track.observations) ++num_points[observation.frame];
+  }
+  std::set<FrameId> apart;
+  for (const auto& [frame, rotation] : result.cam_from_world) {
+    if (num_points[frame] < min_points && StretchAt(result.held, frame) == nullptr) {
+      apart.insert(frame);
     }
   }
-  std::set<FrameId> outside;
-  for (const auto& [frame, rotation] : orientations.cam_from_world) {
-    if (!mapped.contains(pieces.Find(frame.value))) outside.insert(frame);
-  }
-  return outside;
+  return apart;
 }
 
 // FindKeyframePositions from the tracks of all frames.
@@ -346,7 +349,7 @@ PositionResult MapKeyframes(const Orientations& orientations,
       sources.lookalikes.push_back({check.frame, check.match});
     }
     sources.places = orientations.places;
-    sources.outside = OutsideOfMaps(orientations, refined);
+    sources.apart = FramesApart(all_tracks, refined, result, options.resection.min_inliers);
     sources.describe = DescriptionWith(read, refined.camera, options.rotodom.features, num_threads);
     sources.complete = complete;
     sources.held = result.held;

@@ -133,13 +133,13 @@ TEST_F(MendMapsTest, FindsPlacesThatNoMapHolds) {
   EXPECT_LT((centers.at(FrameId{12}) - walk_.truth.center_in_world.at(FrameId{12})).norm(), 0.05);
 }
 
-TEST_F(MendMapsTest, FindsFramesOutsideByThoseBeforeThem) {
+TEST_F(MendMapsTest, FindsFramesApartByThoseBeforeThem) {
   sources_.lookalikes.clear();
   for (Track& track : map_.tracks) {
     std::erase_if(track.observations, [](const auto& one) { return one.frame == FrameId{11}; });
   }
   Adjust(PartOf(map_, false));
-  sources_.outside = {FrameId{11}};
+  sources_.apart = {FrameId{11}};
   EXPECT_THAT(Mend(), Contains(FrameId{11}));
   ASSERT_EQ(refined_.bundles.size(), 1U);
   const CenterMap& centers = refined_.bundles[0].reconstruction.center_in_world;
