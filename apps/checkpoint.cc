@@ -54,9 +54,10 @@ std::string Text(const OptionValue& value) {
 }
 
 std::string DescribeCamera(const Camera& camera) {
-  const auto& [model, width, height, fx, fy, cx, cy, distortion, readout_s] = camera;
+  const auto& [model, width, height, fx, fy, cx, cy, distortion, readout_s, readout_from] = camera;
   return Describe(camera) + " (" +
-         ChecksumOf(model, width, height, fx, fy, cx, cy, distortion, readout_s) + ")";
+         ChecksumOf(model, width, height, fx, fy, cx, cy, distortion, readout_s, readout_from) +
+         ")";
 }
 
 // Names, sizes and times of the images, in their order.

@@ -59,6 +59,9 @@ Camera CameraOf(const nlohmann::ordered_json& summary, const std::string& path) 
     camera.cy = json.at("cy");
     if (json.contains("distortion")) camera.distortion = json.at("distortion");
     if (json.contains("readout_s")) camera.readout_s = json.at("readout_s");
+    if (json.contains("readout_from")) {
+      camera.readout_from = FindReadoutStart(json.at("readout_from")).value();
+    }
     if (const auto problem = camera.Problem()) throw std::runtime_error(*problem);
     return camera;
   } catch (const std::exception& error) {

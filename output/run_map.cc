@@ -13,7 +13,7 @@
 namespace rotslam {
 namespace {
 
-constexpr std::string_view kMagic = "rotslam_map 1\n";
+constexpr std::string_view kMagic = "rotslam_map 2\n";
 constexpr double kMaxOwnNormError = 1e-6;
 
 void PutRotation(BinaryWriter& writer, const Rotation& rotation) {
@@ -54,6 +54,7 @@ void PutCamera(BinaryWriter& writer, const Camera& camera) {
   for (const double value : {camera.fx, camera.fy, camera.cx, camera.cy}) writer.Put(value);
   for (const double value : camera.distortion) writer.Put(value);
   writer.Put(camera.readout_s);
+  writer.Put(static_cast<std::int32_t>(camera.readout_from));
 }
 
 Camera GetCamera(BinaryReader& reader) {
@@ -70,6 +71,11 @@ Camera GetCamera(BinaryReader& reader) {
   }
   for (double& value : camera.distortion) value = reader.Get<double>();
   camera.readout_s = reader.Get<double>();
+  const auto readout_from = reader.Get<std::int32_t>();
+  if (readout_from < 0 || readout_from > static_cast<std::int32_t>(ReadoutStart::kRight)) {
+    reader.Fail("the shutter's start " + std::to_string(readout_from) + " is not known");
+  }
+  camera.readout_from = static_cast<ReadoutStart>(readout_from);
   if (const auto problem = camera.Problem()) reader.Fail("camera: " + *problem);
   return camera;
 }

@@ -42,7 +42,10 @@ Json CameraToJson(const Camera& camera) {
                  {"cx", camera.cx},
                  {"cy", camera.cy}};
   if (camera.model != CameraModel::kPinhole) object["distortion"] = camera.distortion;
-  if (camera.readout_s != 0.0) object["readout_s"] = camera.readout_s;
+  if (camera.readout_s != 0.0) {
+    object["readout_s"] = camera.readout_s;
+    object["readout_from"] = Name(camera.readout_from);
+  }
   return object;
 }
 

@@ -26,7 +26,8 @@ Camera MakeCamera(double fx,
                   int height,
                   const std::string& model,
                   const std::vector<double>& distortion,
-                  double readout_s) {
+                  double readout_s,
+                  const std::string& readout_from) {
   Camera camera;
   bool is_known = false;
   for (const CameraModel known :
@@ -51,6 +52,12 @@ Camera MakeCamera(double fx,
   camera.width = width;
   camera.height = height;
   camera.readout_s = readout_s;
+  const auto start = FindReadoutStart(readout_from);
+  if (!start) {
+    throw std::invalid_argument("readout_from is \"" + readout_from +
+                                "\", must be top, bottom, left or right");
+  }
+  camera.readout_from = *start;
   if (const auto problem = camera.Problem()) throw std::invalid_argument(*problem);
   return camera;
 }
@@ -72,7 +79,8 @@ void AddCamera(py::module_& module) {
 
 Lengths in pixels, pixel centres at integer coordinates. model is "pinhole", "radtan" (OpenCV:
 k1 k2 p1 p2 k3) or "equidistant" (k1 k2 k3 k4). readout_s: rolling shutter, seconds from the
-first row to the last; 0 for a global one.)")
+first row to the last; 0 for a global one. readout_from: where its first row is, "top", "bottom",
+"left" or "right".)")
       .def(py::init(&MakeCamera),
            "fx"_a,
            "fy"_a,
@@ -82,7 +90,8 @@ first row to the last; 0 for a global one.)")
            "height"_a,
            "model"_a = "pinhole",
            "distortion"_a = std::vector<double>(),
-           "readout_s"_a = 0.0)
+           "readout_s"_a = 0.0,
+           "readout_from"_a = "top")
       .def_readonly("fx", &Camera::fx)
       .def_readonly("fy", &Camera::fy)
       .def_readonly("cx", &Camera::cx)
@@ -91,6 +100,8 @@ first row to the last; 0 for a global one.)")
       .def_readonly("height", &Camera::height)
       .def_readonly("distortion", &Camera::distortion)
       .def_readonly("readout_s", &Camera::readout_s)
+      .def_property_readonly("readout_from",
+                             [](const Camera& camera) { return Name(camera.readout_from); })
       .def_property_readonly("model", [](const Camera& camera) { return Name(camera.model); })
       .def("__repr__",
            [](const Camera& camera) { return "<rotslam.Camera " + Describe(camera) + ">"; });

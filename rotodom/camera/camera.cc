@@ -239,6 +239,28 @@ const char* Name(CameraModel model) {
   return "unknown";
 }
 
+const char* Name(ReadoutStart start) {
+  switch (start) {
+    case ReadoutStart::kTop:
+      return "top";
+    case ReadoutStart::kBottom:
+      return "bottom";
+    case ReadoutStart::kLeft:
+      return "left";
+    case ReadoutStart::kRight:
+      return "right";
+  }
+  return "unknown";
+}
+
+std::optional<ReadoutStart> FindReadoutStart(const std::string& name) {
+  for (const ReadoutStart start :
+       {ReadoutStart::kTop, ReadoutStart::kBottom, ReadoutStart::kLeft, ReadoutStart::kRight}) {
+    if (name == Name(start)) return start;
+  }
+  return std::nullopt;
+}
+
 std::optional<Eigen::Vector2d> Camera::Project(const Eigen::Vector3d& point_in_cam,
                                                Eigen::Matrix<double, 2, 3>* J) const {
   // kPinhole is kRadtan with an empty polynomial.
@@ -266,8 +288,15 @@ std::optional<Eigen::Vector3d> Camera::Unproject(const Eigen::Vector2d& pixel) c
   return plane->homogeneous().normalized();
 }
 
-double Camera::RowTime(double y_px) const {
-  return height > 0 ? readout_s * ((y_px + 0.5) / height - 0.5) : 0.0;
+double Camera::ExposureTime(const Eigen::Vector2d& pixel) const {
+  const bool along_rows =
+      readout_from == ReadoutStart::kLeft || readout_from == ReadoutStart::kRight;
+  const int length = along_rows ? width : height;
+  if (length == 0) return 0.0;
+  const double from_middle = ((along_rows ? pixel.x() : pixel.y()) + 0.5) / length - 0.5;
+  const bool is_reversed =
+      readout_from == ReadoutStart::kBottom || readout_from == ReadoutStart::kRight;
+  return readout_s * (is_reversed ? -from_middle : from_middle);
 }
 
 std::optional<std::string> Camera::Problem() const {
@@ -323,7 +352,11 @@ std::string Describe(const Camera& camera) {
   } else {
     text << ", size from the images";
   }
-  if (camera.readout_s > 0.0) text << ", rolling shutter " << camera.readout_s << " s";
+  if (camera.readout_s > 0.0) {
+    text << ", rolling shutter " << camera.readout_s << " s";
+    if (camera.readout_from != ReadoutStart::kTop)
+      text << " from the " << Name(camera.readout_from);
+  }
   return text.str();
 }
 

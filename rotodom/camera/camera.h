@@ -17,6 +17,16 @@ enum class CameraModel {
 /// `pinhole`, `radtan` or `equidistant`, as our camera files spell it.
 const char* Name(CameraModel model);
 
+/// The side of the image that a rolling shutter exposes first: the top, or another one where images
+/// are turned after they were taken, as those of a phone held upright.
+enum class ReadoutStart { kTop, kBottom, kLeft, kRight };
+
+/// `top`, `bottom`, `left` or `right`, as our camera files spell it.
+const char* Name(ReadoutStart start);
+
+/// The one that has this name; nullopt: none.
+std::optional<ReadoutStart> FindReadoutStart(const std::string& name);
+
 /// One calibrated camera. x right, y down, z forward; pixel centres at integer coordinates.
 struct Camera {
   CameraModel model = CameraModel::kPinhole;
@@ -27,9 +37,10 @@ struct Camera {
   double cx = 0.0;
   double cy = 0.0;
   std::array<double, 5> distortion = {};  // k1 k2 p1 p2 k3, or k1 k2 k3 k4 and a zero
-  // Rolling shutter: time from the exposure of the first row to that of the last; 0 for a global
-  // shutter.
+  // Rolling shutter: time from the exposure of the first row to that of the last (of the columns if
+  // it starts at a side); 0 for a global shutter.
   double readout_s = 0.0;
+  ReadoutStart readout_from = ReadoutStart::kTop;
 
   /// Pixel that shows `point_in_cam`; nullopt where the model does not reach (behind the image
   /// plane for kPinhole and kRadtan, beyond the fold of the distortion polynomial).
@@ -42,8 +53,9 @@ struct Camera {
   /// Error: Project(Unproject(p)) == p to 1e-9 px where the model is invertible.
   std::optional<Eigen::Vector3d> Unproject(const Eigen::Vector2d& pixel) const;
 
-  /// When a row is exposed, counted from the middle of the frame; seconds, 0 for a global shutter.
-  double RowTime(double y_px) const;
+  /// When the row, or column, of a pixel is exposed, counted from the middle of the frame; seconds,
+  /// 0 for a global shutter.
+  double ExposureTime(const Eigen::Vector2d& pixel) const;
 
   /// Pixels per radian near the image centre: the mean of fx and fy.
   double MeanFocal() const { return 0.5 * (fx + fy); }

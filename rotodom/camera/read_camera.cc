@@ -141,15 +141,23 @@ CameraModel WithoutEmptyDistortion(const Camera& camera) {
 }
 
 Camera ReadOurs(const fs::path& file, const YAML::Node& root) {
-  static const std::vector<std::string> kKeys = {
-      "model", "width", "height", "fx", "fy", "cx", "cy", "distortion", "readout_s"};
+  static const std::vector<std::string> kKeys = {"model",
+                                                 "width",
+                                                 "height",
+                                                 "fx",
+                                                 "fy",
+                                                 "cx",
+                                                 "cy",
+                                                 "distortion",
+                                                 "readout_s",
+                                                 "readout_from"};
   for (const auto& entry : root) {
     const std::string key = entry.first.Scalar();
     if (std::find(kKeys.begin(), kKeys.end(), key) == kKeys.end()) {
       Fail(file,
            "line " + std::to_string(entry.first.Mark().line + 1) + ": " + key +
                " is no key of a camera file; known are model, width, height, fx, fy, cx, cy, "
-               "distortion, readout_s");
+               "distortion, readout_s, readout_from");
     }
   }
   const Section section(file, root, "");
@@ -175,6 +183,12 @@ Camera ReadOurs(const fs::path& file, const YAML::Node& root) {
   }
   camera.distortion = ReadDistortion(section, "distortion", camera.model);
   camera.readout_s = section.FiniteOrZero("readout_s");
+  if (section.Has("readout_from")) {
+    const std::string name = section.Text("readout_from");
+    const auto start = FindReadoutStart(name);
+    if (!start) Fail(file, "readout_from is '" + name + "', must be top, bottom, left or right");
+    camera.readout_from = *start;
+  }
   return camera;
 }
 
@@ -475,7 +489,10 @@ std::string CameraYaml(const Camera& camera) {
     text += NumberText(camera.distortion[k]);
   }
   text += "]\n";
-  if (camera.readout_s > 0.0) text += "readout_s: " + NumberText(camera.readout_s) + "\n";
+  if (camera.readout_s > 0.0) {
+    text += "readout_s: " + NumberText(camera.readout_s) + "\n";
+    text += "readout_from: " + std::string(Name(camera.readout_from)) + "\n";
+  }
   return text;
 }
 

@@ -143,9 +143,9 @@ class Completion {
     if (!px) return std::nullopt;
     place.mid_frame_px = place.image_px = *px;
     if (camera_.readout_s == 0.0) return place;
-    // The row decides on the pose, which decides on the row.
+    // The pixel decides on the pose, which decides on the pixel.
     for (int k = 0; k < 2; ++k) {
-      const double late_s = camera_.RowTime(place.image_px.y());
+      const double late_s = camera_.ExposureTime(place.image_px);
       place.cam_from_world = Rotation::Exp(late_s * view.view->rate) * view.cam_from_world;
       place.in_cam = place.cam_from_world *
                      Eigen::Vector3d(point - view.center_in_world - late_s * view.view->velocity);

@@ -9,7 +9,7 @@ std::optional<Eigen::Vector3d> BearingInMidFrame(const Eigen::Vector2d& keypoint
                                                  const Eigen::Vector3d& rate,
                                                  const Eigen::Vector2d& flow_px_per_s) {
   if (camera.readout_s == 0.0) return camera.Unproject(keypoint_px);
-  const double late_s = camera.RowTime(keypoint_px.y());
+  const double late_s = camera.ExposureTime(keypoint_px);
   const auto bearing = camera.Unproject(keypoint_px - late_s * flow_px_per_s);
   if (!bearing) return std::nullopt;
   return Rotation::Exp(-late_s * rate) * *bearing;

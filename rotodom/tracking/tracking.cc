@@ -103,7 +103,7 @@ class Search {
     std::optional<Eigen::Vector2d> px = Turn(candidate.view, candidate.index);
     if (!px) return std::nullopt;
     double ahead_s = target_.timestamp_s - view.timestamp_s;
-    if (camera_.readout_s > 0.0) ahead_s += camera_.RowTime(px->y());
+    if (camera_.readout_s > 0.0) ahead_s += camera_.ExposureTime(*px);
     const Eigen::Vector2d flow = target_.flow
                                      ? target_.flow->At(view.features.keypoints_px[candidate.index])
                                      : view.flow_px_per_s[candidate.index];
@@ -154,16 +154,17 @@ class Search {
            px.x() < image.cols - 1 - kPatchBorderPx && px.y() < image.rows - 1 - kPatchBorderPx;
   }
 
-  // Where the turn alone would show a point of one of the views, exposed with the row that shows
-  // it; nullopt: the row where it would show without a rolling shutter.
-  std::optional<Eigen::Vector2d> Turn(int view_index,
-                                      int index,
-                                      std::optional<double> row_px = std::nullopt) const {
+  // Where the turn alone would show a point of one of the views, exposed with the pixel that shows
+  // it; nullopt: the one where it would show without a rolling shutter.
+  std::optional<Eigen::Vector2d> Turn(
+      int view_index,
+      int index,
+      const std::optional<Eigen::Vector2d>& shown_px = std::nullopt) const {
     const Eigen::Vector3d bearing =
         target_from_view_[view_index] * views_[view_index].view->features.bearings[index];
     std::optional<Eigen::Vector2d> px = camera_.Project(bearing);
     if (!px || camera_.readout_s == 0.0) return px;
-    const double late_s = camera_.RowTime(row_px.value_or(px->y()));
+    const double late_s = camera_.ExposureTime(shown_px.value_or(*px));
     return camera_.Project(Rotation::Exp(late_s * target_.rate) * bearing);
   }
 
@@ -172,7 +173,7 @@ class Search {
                         int view_index,
                         int index,
                         const PatchAlignment& found) const {
-    const auto turned_px = Turn(view_index, index, found.center_px.y());
+    const auto turned_px = Turn(view_index, index, found.center_px);
     if (!turned_px) return found;
     const Eigen::Vector2d flow_px = found.center_px - *turned_px;
     if (flow_px.norm() < kFlowThatShowsPx) return found;

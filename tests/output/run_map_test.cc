@@ -17,7 +17,9 @@ using testing::HasSubstr;
 
 TEST(RunMap, ReadsBackWhatItHasWritten) {
   const TemporaryFolder folder;
-  const RunMap map = MapOfScene(ExportScene());
+  RunMap map = MapOfScene(ExportScene());
+  map.camera.readout_s = 0.02;
+  map.camera.readout_from = ReadoutStart::kRight;
   WriteRunMap(folder.path() / "map.bin", map);
   const RunMap read = ReadRunMap(folder.path() / "map.bin");
   EXPECT_EQ(read.camera, map.camera);

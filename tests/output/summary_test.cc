@@ -95,6 +95,7 @@ TEST(Summary, TellsOfARollingShutter) {
   EXPECT_FALSE(nlohmann::json::parse(SummaryJson(summary))["camera"].contains("readout_s"));
   summary.camera->readout_s = 0.018;
   EXPECT_EQ(nlohmann::json::parse(SummaryJson(summary))["camera"]["readout_s"], 0.018);
+  EXPECT_EQ(nlohmann::json::parse(SummaryJson(summary))["camera"]["readout_from"], "top");
 }
 
 TEST(Summary, LeavesOutWhatDidNotRun) {

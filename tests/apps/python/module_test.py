@@ -181,7 +181,10 @@ class OptionsAndCameras(unittest.TestCase):
         camera = rotslam.Camera(250, 251, 160, 120, 320, 240, "radtan", [0.1, 0.2])
         self.assertEqual((camera.model, camera.fy, camera.distortion),
                          ("radtan", 251, [0.1, 0.2, 0, 0, 0]))
-        for wrong in ({"fx": -1}, {"model": "fisheye"}, {"distortion": [0] * 6}):
+        upright = rotslam.Camera(250, 250, 120, 160, 240, 320, readout_s=0.02, readout_from="right")
+        self.assertEqual((upright.readout_s, upright.readout_from), (0.02, "right"))
+        for wrong in ({"fx": -1}, {"model": "fisheye"}, {"distortion": [0] * 6},
+                      {"readout_from": "up"}):
             with self.assertRaises(ValueError):
                 rotslam.Camera(**{"fx": 250, "fy": 250, "cx": 160, "cy": 120, "width": 320,
                                   "height": 240, **wrong})

@@ -3,6 +3,7 @@
 #include <cmath>
 #include <limits>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include <Eigen/Geometry>
@@ -242,20 +243,42 @@ TEST(Camera, ProblemNamesTheField) {
 TEST(Camera, AGlobalShutterExposesAllRowsAtOnce) {
   const Camera camera = Cameras().front().camera;
   EXPECT_EQ(camera.readout_s, 0.0);
-  for (const double y_px : {0.0, 100.0, 375.0}) EXPECT_EQ(camera.RowTime(y_px), 0.0);
+  for (const double y_px : {0.0, 100.0, 375.0}) {
+    EXPECT_EQ(camera.ExposureTime({20.0, y_px}), 0.0);
+  }
 }
 
 TEST(Camera, ARollingShutterExposesRowAfterRow) {
   Camera camera = Cameras().front().camera;
   camera.readout_s = 0.03;
   const double last = camera.height - 1;
-  EXPECT_NEAR(camera.RowTime(0.5 * last), 0.0, 1e-15);  // counted from the middle of the frame
+  const auto time = [&](double y_px) { return camera.ExposureTime({20.0, y_px}); };
+  EXPECT_NEAR(time(0.5 * last), 0.0, 1e-15);  // counted from the middle of the frame
   // The readout ends with the last row's own share, which is less than a hundredth of it here.
-  EXPECT_NEAR(camera.RowTime(last) - camera.RowTime(0.0), camera.readout_s, 1e-2 * 0.03);
+  EXPECT_NEAR(time(last) - time(0.0), camera.readout_s, 1e-2 * 0.03);
   for (double y_px = 0.0; y_px < last; y_px += 7.5) {
-    EXPECT_LT(camera.RowTime(y_px), camera.RowTime(y_px + 1.0));
-    EXPECT_NEAR(camera.RowTime(y_px), -camera.RowTime(last - y_px), 1e-15);
+    EXPECT_LT(time(y_px), time(y_px + 1.0));
+    EXPECT_NEAR(time(y_px), -time(last - y_px), 1e-15);
+    EXPECT_EQ(time(y_px), camera.ExposureTime({300.0, y_px}));
   }
+}
+
+TEST(Camera, ARollingShutterStartsAtAnySide) {
+  Camera camera = Cameras().front().camera;
+  camera.readout_s = 0.03;
+  const Eigen::Vector2d size_px(camera.width, camera.height);
+  const Eigen::Vector2d px(25.0, 40.0);
+  const Eigen::Vector2d from_middle_s =
+      0.03 * ((px.array() + 0.5) / size_px.array() - 0.5).matrix();
+  for (const auto& [start, time_s] : {std::pair("top", from_middle_s.y()),
+                                      std::pair("bottom", -from_middle_s.y()),
+                                      std::pair("left", from_middle_s.x()),
+                                      std::pair("right", -from_middle_s.x())}) {
+    camera.readout_from = FindReadoutStart(start).value();
+    EXPECT_STREQ(Name(camera.readout_from), start);
+    EXPECT_NEAR(camera.ExposureTime(px), time_s, 1e-15) << start;
+  }
+  EXPECT_EQ(FindReadoutStart("up"), std::nullopt);
 }
 
 TEST(Camera, DescribesItselfInOneLine) {

@@ -86,11 +86,16 @@ TEST_F(ReadCameraTest, OursKnowsTheReadoutOfARollingShutter) {
   EXPECT_THAT(Complaint(global + "readout_s: fast\n"), HasSubstr("readout_s"));
   EXPECT_THAT(Complaint(global + "readout_s: .nan\n"), HasSubstr("readout_s"));
   EXPECT_THAT(Complaint(global + "readout: 0.01\n"), HasSubstr("readout is no key"));
+  EXPECT_EQ(Read(global + "readout_s: 0.02\n").readout_from, ReadoutStart::kTop);
+  EXPECT_EQ(Read(global + "readout_from: right\n").readout_from, ReadoutStart::kRight);
+  EXPECT_THAT(Complaint(global + "readout_from: up\n"),
+              HasSubstr("readout_from is 'up', must be top, bottom, left or right"));
 
   Camera camera = Read(global);
   EXPECT_THAT(CameraYaml(camera), Not(HasSubstr("readout_s")));
   for (const double readout_s : {1.0 / 30.0, 1e-9, 0.999}) {
     camera.readout_s = readout_s;
+    camera.readout_from = ReadoutStart::kLeft;
     WriteCameraYaml(folder_ / "camera.yaml", camera);
     EXPECT_EQ(ReadCamera(folder_ / "camera.yaml"), camera) << CameraYaml(camera);
   }

@@ -18,7 +18,7 @@ constexpr double kSpacing = 0.25;
 constexpr double kWallDepth = 4.0;
 constexpr double kReadout_s = 0.03;
 
-Camera SmallPinhole(double readout_s) {
+Camera SmallPinhole(double readout_s, ReadoutStart readout_from) {
   Camera camera;
   camera.width = 321;  // odd, so that half an image has no last column
   camera.height = 240;
@@ -26,6 +26,7 @@ Camera SmallPinhole(double readout_s) {
   camera.cx = 160.0;
   camera.cy = 119.5;
   camera.readout_s = readout_s;
+  camera.readout_from = readout_from;
   return camera;
 }
 
@@ -74,7 +75,8 @@ const Wall& TheWall() {
 
 // A walk along the wall, looking at it a little from the side.
 struct Walk {
-  explicit Walk(double readout_s = 0.0) : camera(SmallPinhole(readout_s)) {
+  explicit Walk(double readout_s = 0.0, ReadoutStart readout_from = ReadoutStart::kTop)
+      : camera(SmallPinhole(readout_s, readout_from)) {
     for (int k = 0; k < kNumViews; ++k) {
       const FrameId frame{k};
       map.cam_from_world[frame] = Rotation::Exp({0.01 * k, 0.15 - 0.03 * k, 0.02 * k});
@@ -108,13 +110,13 @@ struct Walk {
   cv::Mat ImageOf(FrameId frame, const MapView& motion) const {
     cv::Mat image(camera.height, camera.width, CV_8U);
     for (int row = 0; row < camera.height; ++row) {
-      const double late_s = camera.RowTime(row);
-      const Rotation world_from_cam =
-          (Rotation::Exp(late_s * motion.rate) * map.cam_from_world.at(frame)).Inverse();
-      const Eigen::Vector3d center = map.center_in_world.at(frame) + late_s * motion.velocity;
       for (int column = 0; column < camera.width; ++column) {
-        const Eigen::Vector3d ray =
-            world_from_cam * *camera.Unproject(Eigen::Vector2d(column, row));
+        const Eigen::Vector2d px(column, row);
+        const double late_s = camera.ExposureTime(px);
+        const Rotation world_from_cam =
+            (Rotation::Exp(late_s * motion.rate) * map.cam_from_world.at(frame)).Inverse();
+        const Eigen::Vector3d center = map.center_in_world.at(frame) + late_s * motion.velocity;
+        const Eigen::Vector3d ray = world_from_cam * *camera.Unproject(px);
         const Eigen::Vector3d on_wall = center + ray * ((kWallDepth - center.z()) / ray.z());
         image.at<std::uint8_t>(row, column) =
             cv::saturate_cast<std::uint8_t>(TheWall().GreyAt(on_wall.x(), on_wall.y()));
@@ -231,8 +233,14 @@ TEST(CompleteTracks, FindsThemWhereTheMapIsPixelsOff) {
   EXPECT_LT(Quantile(ErrorsPx(truth, tracks), 0.5), 0.06);
 }
 
-TEST(CompleteTracks, FindsThemThroughARollingShutter) {
-  Walk walk(kReadout_s);
+class ThroughAShutter : public testing::TestWithParam<ReadoutStart> {};
+INSTANTIATE_TEST_SUITE_P(CompleteTracks,
+                         ThroughAShutter,
+                         testing::Values(ReadoutStart::kTop, ReadoutStart::kRight),
+                         [](const auto& start) { return Name(start.param); });
+
+TEST_P(ThroughAShutter, FindsThem) {
+  Walk walk(kReadout_s, GetParam());
   walk.See(3, 5);
   ExpectFindsNearlyAll(walk, 0.07);
   // Without the motion, rows at the border are out by pixels.

@@ -6,9 +6,11 @@
 #include <functional>
 #include <numbers>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include <gtest/gtest.h>
+#include <opencv2/core.hpp>
 
 #include "rotodom/odometry.h"
 #include "tests/rotodom/features/textured_world.h"
@@ -37,10 +39,23 @@ std::vector<cv::Mat> Film(const Motion& cam_from_world, int num_frames, double r
   camera.readout_s = readout_s;
   std::vector<cv::Mat> images;
   for (int k = 0; k < num_frames; ++k) {
-    images.push_back(world.ViewByRow(
-        camera, [&](int row) { return cam_from_world(k / kFps + camera.RowTime(row)); }));
+    images.push_back(world.ViewByRow(camera, [&](int row) {
+      return cam_from_world(k / kFps + camera.ExposureTime(Eigen::Vector2d(0, row)));
+    }));
   }
   return images;
+}
+
+std::vector<FrameEstimate> Follow(const std::vector<cv::Mat>& images,
+                                  const Camera& camera,
+                                  const OdometryOptions& options = FewFeatures(),
+                                  int num_threads = 1) {
+  RotationalOdometry odometry(camera, options, 1, num_threads);
+  std::vector<FrameEstimate> estimates;
+  for (int k = 0; k < static_cast<int>(images.size()); ++k) {
+    estimates.push_back(odometry.AddFrame(FrameId{k}, k / kFps, images[k]));
+  }
+  return estimates;
 }
 
 std::vector<FrameEstimate> Follow(const std::vector<cv::Mat>& images,
@@ -49,12 +64,7 @@ std::vector<FrameEstimate> Follow(const std::vector<cv::Mat>& images,
                                   int num_threads = 1) {
   Camera camera = SmallCamera();
   camera.readout_s = readout_s;
-  RotationalOdometry odometry(camera, options, 1, num_threads);
-  std::vector<FrameEstimate> estimates;
-  for (int k = 0; k < static_cast<int>(images.size()); ++k) {
-    estimates.push_back(odometry.AddFrame(FrameId{k}, k / kFps, images[k]));
-  }
-  return estimates;
+  return Follow(images, camera, options, num_threads);
 }
 
 OdometryResult Collect(const std::vector<FrameEstimate>& estimates) {
@@ -198,6 +208,29 @@ TEST(RollingShutter, IsTakenOutWhereTheReadoutIsKnown) {
     EXPECT_LT(known_deg, 0.25 * unknown_deg) << "gap " << gap;
     EXPECT_LT(known_deg, 0.25 * twice_deg) << "gap " << gap;
     EXPECT_LT(known_deg, 0.05) << "gap " << gap;
+  }
+}
+
+// A phone held upright: its images are turned clockwise, what was at the top is at the right.
+TEST(RollingShutter, StartsAtTheRightOfImagesThatAreTurned) {
+  std::vector<cv::Mat> images = Film(Shake, 30, 0.025);
+  for (cv::Mat& image : images) cv::rotate(image, image, cv::ROTATE_90_CLOCKWISE);
+  Camera camera = SmallCamera();
+  std::swap(camera.width, camera.height);
+  std::swap(camera.cx, camera.cy);
+  camera.readout_s = 0.025;
+  const auto error_deg = [&](ReadoutStart start) {
+    camera.readout_from = start;
+    return RelativeErrorDeg(
+        Collect(Follow(images, camera)).cam_from_world,
+        [](double time_s) { return TurnDeg(0.0, 0.0, 90.0) * Shake(time_s); },
+        1);
+  };
+  const double right_deg = error_deg(ReadoutStart::kRight);
+  RecordProperty("right_deg", std::to_string(right_deg));
+  EXPECT_LT(right_deg, 0.05);
+  for (const ReadoutStart wrong : {ReadoutStart::kTop, ReadoutStart::kLeft}) {
+    EXPECT_GT(error_deg(wrong), 4.0 * right_deg) << Name(wrong);
   }
 }
 

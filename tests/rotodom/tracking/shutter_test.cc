@@ -8,18 +8,25 @@
 namespace rotslam {
 namespace {
 
-TEST(MoveToMidFrame, PutsCornersWhereAGlobalShutterSeesThem) {
+class MoveToMidFrameTest : public testing::TestWithParam<ReadoutStart> {};
+INSTANTIATE_TEST_SUITE_P(ReadoutStarts,
+                         MoveToMidFrameTest,
+                         testing::Values(ReadoutStart::kTop, ReadoutStart::kRight),
+                         [](const auto& start) { return Name(start.param); });
+
+TEST_P(MoveToMidFrameTest, PutsCornersWhereAGlobalShutterSeesThem) {
   Camera camera = BaCamera();
   camera.readout_s = 0.03;
+  camera.readout_from = GetParam();
   const Eigen::Vector3d rate(0.4, -0.8, 0.5);
   Features corners;
   std::vector<Eigen::Vector3d> bearings;
   for (const double y : {40.0, 200.0, 330.0}) {
-    // What the row sees as it is exposed.
+    // What the pixel sees as it is exposed.
     const Eigen::Vector2d px(150.0, y);
     corners.keypoints_px.push_back(px);
     corners.bearings.push_back(*camera.Unproject(px));
-    bearings.emplace_back(Rotation::Exp(-camera.RowTime(y) * rate) * corners.bearings.back());
+    bearings.emplace_back(Rotation::Exp(-camera.ExposureTime(px) * rate) * corners.bearings.back());
   }
   const Features seen = corners;
   MoveToMidFrame(camera, rate, corners);
