@@ -278,24 +278,26 @@ int Complete(const TrackCompletion& complete, BundleState& state) {
 // Poses and well-fitting tracks of `state`.
 void TakeResult(const BundleProblem& problem, const BundleState& state, BundleResult& result) {
   result.camera = state.camera;
+  // Points tell both, directions the rotation.
+  std::vector<bool> frame_turned(state.frames.size(), false);
   std::vector<bool> center_seen(state.centers.size(), false);
   for (const TrackState& entry : state.tracks) {
-    if (entry.kind != TrackKind::kPoint) continue;
+    if (entry.kind == TrackKind::kOut) continue;
     for (const Sight& sight : entry.sights) {
-      if (sight.used) center_seen[state.frames[sight.frame].center] = true;
+      if (!sight.used) continue;
+      frame_turned[sight.frame] = true;
+      if (entry.kind == TrackKind::kPoint) center_seen[state.frames[sight.frame].center] = true;
     }
   }
   Reconstruction& out = result.reconstruction;
   out = MapOf(state);
-  out.center_in_world.clear();
-  out.cam_from_world.insert(problem.start.cam_from_world.begin(),
-                            problem.start.cam_from_world.end());
   result.summary.num_observations = NumObservations(out.tracks);
-  for (const FrameState& frame : state.frames) {
-    if (center_seen[frame.center] || frame.fixed) {
-      out.center_in_world[frame.id] = state.centers[frame.center];
-    }
+  for (std::size_t k = 0; k < state.frames.size(); ++k) {
+    const FrameState& frame = state.frames[k];
     if (frame.weak) result.weak_frames.push_back(frame.id);
+    if (frame.fixed) continue;
+    if (!frame_turned[k]) out.cam_from_world.erase(frame.id);
+    if (!frame_turned[k] || !center_seen[frame.center]) out.center_in_world.erase(frame.id);
   }
   const int num_given = NumObservations(problem.start.tracks);
   BundleSummary& summary = result.summary;
@@ -385,6 +387,7 @@ Reconstruction TriangulateTracks(const BundleProblem& problem, const BundleOptio
   ClassifyAll(options.fine, Placement::kAnywhere, options, state);
   BundleResult result;
   TakeResult(problem, state, result);
+  result.reconstruction.cam_from_world = problem.start.cam_from_world;
   result.reconstruction.center_in_world = problem.start.center_in_world;
   return std::move(result.reconstruction);
 }

@@ -115,13 +115,13 @@ struct BundleResult {
   BundleStatus status = BundleStatus::kNotRun;
   std::string message;  // one sentence for a person
   /// Poses, points, and tracks with only the observations that fit them. Every track in it has a
-  /// point. A frame whose place no observation tells keeps its rotation but has no centre, so it
-  /// has no pose: resect or interpolate it. The start, unchanged, when not usable.
+  /// point. A frame that is left without observations has neither rotation nor centre, for what led
+  /// it to where it is does not fit: resect or interpolate it. One that sees directions alone has
+  /// its rotation. The start, unchanged, when not usable.
   Reconstruction reconstruction;
   /// The camera with its lens refined; the bearings in `reconstruction` are its.
   Camera camera;
-  /// Frames with a pose at the start but too few good observations to refine it; those that share
-  /// the centre of a refined frame still have a pose.
+  /// Frames with a pose at the start but too few good observations to refine it.
   std::vector<FrameId> weak_frames;
   /// With `options.find_covariance`, of the frames that see points: in the result's gauge (see
   /// RefineBundle), so that they grow with the distance from the first frame. They count every
