@@ -195,8 +195,9 @@ TrackingResult RotationalOdometry::Track(const std::vector<OrientedView>& views,
   estimate.report.searched_wide = true;
   // Patches that look alike can be found in the wrong places all together; descriptors, sought
   // everywhere, are another witness, better by the places to which their matches were moved.
+  const bool is_clear = recovery && recovery->is_clear;
   std::optional<Rotation> witness;
-  if (recovery) {
+  if (is_clear) {
     const Agreement moved = AgreementOf({recovery->cam_from_world, recovery->points, 0}, views);
     witness = moved.num_points > 0 ? moved.cam_from_world : recovery->cam_from_world;
   }
@@ -214,14 +215,16 @@ TrackingResult RotationalOdometry::Track(const std::vector<OrientedView>& views,
   // Without that witness, few of many points may have been found on anything.
   const bool is_plausible = static_cast<double>(tracked.points.size()) >=
                             options_.tracking.min_found_ratio * tracked.num_sought;
-  if (recovery || is_plausible) consider(std::move(tracked));
+  if (is_clear || is_plausible) consider(std::move(tracked));
   if (recovery) {
     TrackingTarget corrected = target;
     corrected.cam_from_world = recovery->guide_cam_from_world;
     corrected.flow = &recovery->flow;
-    consider(TrackPoints(views, corrected, camera_, options_.tracking, num_threads_));
-    consider({recovery->cam_from_world, recovery->points, 0});
+    TrackingResult guided = TrackPoints(views, corrected, camera_, options_.tracking, num_threads_);
+    // By a wrong guide few patches are found.
+    if (is_clear || !guided.IsPoor(options_.tracking)) consider(std::move(guided));
   }
+  if (is_clear) consider({recovery->cam_from_world, recovery->points, 0});
   return best;
 }
 

@@ -25,21 +25,13 @@ PatchAlignment SharpenedPosition(const View& view,
   return found && found->correlation >= min_correlation ? *found : corner;
 }
 
-// What one view says, and whether enough of what looks alike agrees on it.
-struct Witness {
-  Recovery recovery;
-  bool is_clear = false;
-
-  int num_points() const { return static_cast<int>(recovery.points.size()); }
-};
-
 // Matches one view's points against the target's corners, which have been described.
-std::optional<Witness> RecoverFrom(std::span<const OrientedView> views,
-                                   int v,
-                                   const Features& corners,
-                                   const TrackingTarget& target,
-                                   const Camera& camera,
-                                   const RecoveryOptions& options) {
+std::optional<Recovery> RecoverFrom(std::span<const OrientedView> views,
+                                    int v,
+                                    const Features& corners,
+                                    const TrackingTarget& target,
+                                    const Camera& camera,
+                                    const RecoveryOptions& options) {
   const View& view = *views[v].view;
   Features described = view.features;
   DescribeFeatures(view.pyramid, options.num_threads, described);
@@ -86,18 +78,18 @@ std::optional<Witness> RecoverFrom(std::span<const OrientedView> views,
     return a.track < b.track;
   });
   const double least = options.min_inlier_ratio * static_cast<double>(pairs.size());
-  return Witness{std::move(recovery), static_cast<double>(estimate->inliers.size()) > least};
+  recovery.is_clear = static_cast<double>(estimate->inliers.size()) > least;
+  return recovery;
 }
 
-// The clear one with the most points.
-std::optional<Recovery> Clearest(std::vector<Witness>& witnesses) {
-  std::erase_if(witnesses, [](const Witness& witness) { return !witness.is_clear; });
-  const auto best =
-      std::max_element(witnesses.begin(), witnesses.end(), [](const Witness& a, const Witness& b) {
-        return a.num_points() < b.num_points();
+// A clear one before others, then the one with the most points.
+std::optional<Recovery> Clearest(std::vector<Recovery>& recoveries) {
+  const auto best = std::max_element(
+      recoveries.begin(), recoveries.end(), [](const Recovery& a, const Recovery& b) {
+        return std::pair(a.is_clear, a.points.size()) < std::pair(b.is_clear, b.points.size());
       });
-  if (best == witnesses.end()) return std::nullopt;
-  return std::move(best->recovery);
+  if (best == recoveries.end()) return std::nullopt;
+  return std::move(*best);
 }
 
 }  // namespace
@@ -109,15 +101,18 @@ std::optional<Recovery> RecoverMotion(std::span<const OrientedView> views,
   Features corners;
   DetectFeatures(*target.pyramid, camera, options.features, options.num_threads, corners);
   DescribeFeatures(*target.pyramid, options.num_threads, corners);
-  std::vector<Witness> witnesses;
+  std::vector<Recovery> recoveries;
   for (int v = 0; v < static_cast<int>(views.size()); ++v) {
-    std::optional<Witness> witness = RecoverFrom(views, v, corners, target, camera, options);
-    if (!witness) continue;
-    if (witness->num_points() >= options.tracking.min_points) return std::move(witness->recovery);
+    std::optional<Recovery> recovery = RecoverFrom(views, v, corners, target, camera, options);
+    if (!recovery) continue;
+    if (static_cast<int>(recovery->points.size()) >= options.tracking.min_points) {
+      recovery->is_clear = true;
+      return recovery;
+    }
     // Few points may agree by chance: then the older views are asked as well.
-    witnesses.push_back(*std::move(witness));
+    recoveries.push_back(*std::move(recovery));
   }
-  return Clearest(witnesses);
+  return Clearest(recoveries);
 }
 
 }  // namespace rotslam

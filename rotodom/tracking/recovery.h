@@ -18,6 +18,9 @@ struct Recovery {
   Rotation cam_from_world;           // by the epipolar constraint
   std::vector<TrackedPoint> points;  // those matched, ascending in `track`
   SearchRange range = SearchRange::kGuided;
+  // Enough of what looks alike agrees. If not, it may be by chance: only a guide to where patches
+  // are to be sought.
+  bool is_clear = false;
 };
 
 /// Of finding features again that tracking has lost.
@@ -34,8 +37,8 @@ struct RecoveryOptions {
 /// Matches the target's ORB features against those of `views`, one view after the other, until
 /// tracking.min_points matches agree on a relative rotation, and takes the view with the most: the
 /// way back when tracking has failed. Where fewer agree they must be min_inlier_ratio of those that
-/// look alike: after a gap of seconds, four in ten of a hundred matches agreed on rotations that
-/// were 7 to 10 deg off.
+/// look alike to be clear: after a gap of seconds, four in ten of a hundred matches agreed on
+/// rotations that were 7 to 10 deg off.
 /// @param views  newest first.
 /// @return  nullopt when no view matches.
 std::optional<Recovery> RecoverMotion(std::span<const OrientedView> views,

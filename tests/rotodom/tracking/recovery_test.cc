@@ -3,6 +3,7 @@
 #include <string>
 
 #include <gtest/gtest.h>
+#include <opencv2/imgproc.hpp>
 
 #include "tests/rotodom/tracking/world_views.h"
 
@@ -117,6 +118,7 @@ TEST_F(RecoverMotionTest, TriesOneViewAfterTheOther) {
   const auto recovery =
       Recover({{&blank_, elsewhere}, {&stranger_, elsewhere}, {&known_, Rotation()}}, image);
   ASSERT_TRUE(recovery);
+  EXPECT_TRUE(recovery->is_clear);
   EXPECT_LT((recovery->cam_from_world * cam_from_world.Inverse()).AngleDeg(), 0.1);
   ASSERT_FALSE(recovery->points.empty());
   for (const TrackedPoint& point : recovery->points) EXPECT_EQ(point.view, 2);
@@ -137,6 +139,22 @@ TEST_F(RecoverMotionTest, IsNotFooledByAnotherPlace) {
             .has_value();
   }
   EXPECT_EQ(num_found, 0);
+}
+
+TEST_F(RecoverMotionTest, IsOnlyAGuideWhereTooFewAgree) {
+  const Rotation cam_from_world = TurnDeg(0.0, 15.0, 10.0);
+  cv::Mat image;
+  cv::blur(Look(cam_from_world), image, cv::Size(9, 1));
+  RecoveryOptions options = Options();
+  const auto clear = Recover({{&known_, Rotation()}}, image, options);
+  ASSERT_TRUE(clear);
+  EXPECT_TRUE(clear->is_clear);
+  ASSERT_LT(static_cast<int>(clear->points.size()), options.tracking.min_points);
+  options.min_inlier_ratio = 0.99;
+  const auto guide = Recover({{&known_, Rotation()}}, image, options);
+  ASSERT_TRUE(guide);
+  EXPECT_FALSE(guide->is_clear);
+  EXPECT_LT((guide->guide_cam_from_world * cam_from_world.Inverse()).AngleDeg(), 2.0);
 }
 
 TEST_F(RecoverMotionTest, LeavesOutLostPoints) {
