@@ -118,10 +118,11 @@ TEST_F(SharedData, EurocV101WithAFrameThatMatchesNoOther) {
 
 TEST_F(SharedData, EurocV101WithAFrameThatAWrongEdgeLinks) {
   ROTSLAM_SKIP_WITHOUT("euroc_v101_keyframes");
-  ASSERT_NO_FATAL_FAILURE(Do("run", "euroc_v101_keyframes", {"--last=39"}));
+  ASSERT_NO_FATAL_FAILURE(Do("run", "euroc_v101_keyframes", {"--first=40"}));
   const TrajectoryMetrics metrics =
       Compare(Data("euroc_v101_keyframes/groundtruth_cam0_tum.txt"), Out() / "trajectory_tum.txt");
-  EXPECT_LT(metrics.ate_m.value_or(1e9), 0.05);  // 0.17 where it stands 1.2 m off
+  EXPECT_LT(metrics.rpe1_deg, 1.5);  // 3.7 and 0.17 where it stands 1.2 m off
+  EXPECT_LT(metrics.ate_m.value_or(1e9), 0.08);
 }
 
 // From this start frame 56, which is no place, is led astray by what the tracker has mistaken.
