@@ -23,7 +23,8 @@ constexpr double kWorthlessGain = 1e-9;
 // Points refute the start's rotation where together with it they cost more than all but one in a
 // thousand would that are as good as its covariance says, and they themselves twice what they cost
 // alone: covariances of real footage are up to eight times too small, and blur and a rolling
-// shutter make points err together.
+// shutter make points err together. Nor do points that fit it within their deviations: what little
+// a few of them cost otherwise is their depths' doing, in a turn with hardly any parallax.
 constexpr double kMostRotationCost = 8.1;
 constexpr double kMostCostRatio = 2.0;
 
@@ -246,8 +247,9 @@ std::optional<ResectedPose> ResectFrame(const Camera& camera,
     Pose other = pose;
     const bool settled = by_points.Settle(other);
     const double cost = by_points.Cost(other);
+    const double by_deviations = static_cast<double>(finite.size());  // two coordinates each
     if (settled && resection.Cost(pose) > cost + kMostRotationCost &&
-        by_points.Cost(pose) > kMostCostRatio * cost) {
+        by_points.Cost(pose) > std::max(kMostCostRatio * cost, by_deviations)) {
       pose = other;
       resection.ForgetRotation();
     }

@@ -129,18 +129,20 @@ BaselineEvidence TestBaseline(const PairArrays& pairs,
   }
 
   const double variance = VarianceAcross(errors);
-  const double limit = options.clip_sigmas * options.clip_sigmas * variance;
+  const double squared_clip = options.clip_sigmas * options.clip_sigmas;
   double across = 0.0;
   double sum = 0.0;
   double squares = 0.0;
   double shared = 0.0;
   for (const WhitenedErrors& error : errors) {
-    const double of_line = std::min(error.epipolar, limit);
+    const double of_line = std::min(error.epipolar, squared_clip * variance);
+    // What may be shared must not hide what is beyond it.
+    const double limit = squared_clip * (variance + error.shared);
     const double beyond = std::clamp(error.rotation - error.epipolar, -limit, limit) - of_line;
     across += of_line;
     sum += beyond;
     squares += beyond * beyond;
-    shared += std::min(error.shared, limit);
+    shared += error.shared;
   }
   const double n = static_cast<double>(pairs.size());
   // Exact matches have no noise to measure anything by.

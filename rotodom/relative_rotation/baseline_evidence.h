@@ -24,8 +24,8 @@ struct BaselineTestOptions {
   // a direction. A point that is seen from d aside has moved by less where d is below this part of
   // its distance and the views are a radian apart.
   double lens_error = 0.001;
-  // Errors count up to this many standard deviations, so that a few wrong matches or a small moving
-  // object weigh little.
+  // Errors count up to this many standard deviations, shared errors included, so that a few wrong
+  // matches or a small moving object weigh little.
   double clip_sigmas = 3.0;
 
   std::optional<std::string> Problem() const;

@@ -122,6 +122,20 @@ TEST(ResectFrame, ARotationThatPointsRefuteCountsForNothing) {
   EXPECT_LT((pose->covariance - by_points->covariance).norm(), 1e-6 * by_points->covariance.norm());
 }
 
+TEST(ResectFrame, PointsThatFitARotationWithinTheirDeviationsDoNotRefuteIt) {
+  SeenPoints view = MakeView(CameraModel::kPinhole, 100, 0.05, 0.0);
+  ResectionStart start = NearStart(view, 0.2, 0.3);
+  start.rotation_covariance = std::pow(0.002 * kRadFromDeg, 2) * Eigen::Matrix3d::Identity();
+  // Held, it leaves 0.78 px of each.
+  const auto turn_deg = [&](double sigma_px) {
+    for (PointSighting& sighting : view.sightings) sighting.sigma_px = sigma_px;
+    const auto pose = ResectFrame(view.camera, view.sightings, start, {.max_iterations = 200});
+    return pose ? AngleErrorDeg(*pose, view) : 180.0;
+  };
+  EXPECT_LT(turn_deg(0.3), 0.01);
+  EXPECT_NEAR(turn_deg(1.0), 0.2, 0.01);
+}
+
 TEST(ResectFrame, SaysNoToTooLittle) {
   const SeenPoints view = MakeView(CameraModel::kPinhole, 100, 0.0, 0.0);
   const ResectionStart start = NearStart(view, 0.5, 0.2);

@@ -75,6 +75,21 @@ TEST(TestBaseline, FindsWhatIsAboveTheNoise) {
 }
 
 // All matches err four times as far along one axis of the image, as on a scene of vertical edges.
+// What the lens may have wrong over a wide turn, 0.24 px, is many deviations of exact matches.
+TEST(TestBaseline, FindsWhatIsAboveTheLensErrorOfAWideTurn) {
+  const auto share = [](double baseline_over_depth) {
+    return ShareWithBaseline({.baseline_over_depth = baseline_over_depth,
+                              .noise_px = 0.05,
+                              .outlier_ratio = 0.05,
+                              .rotation_deg = 20.0},
+                             {},
+                             50);
+  };
+  EXPECT_EQ(share(0.0), 0.0);
+  EXPECT_GE(share(0.01), 0.98);
+  EXPECT_EQ(share(0.05), 1.0);
+}
+
 TEST(TestBaseline, CovariancesTellAScenesEdgesFromABaseline) {
   std::mt19937_64 random(5);
   std::normal_distribution<double> normal;
