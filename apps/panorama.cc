@@ -60,7 +60,9 @@ Camera CameraOf(const nlohmann::ordered_json& summary, const std::string& path) 
     if (json.contains("distortion")) camera.distortion = json.at("distortion");
     if (json.contains("readout_s")) camera.readout_s = json.at("readout_s");
     if (json.contains("readout_from")) {
-      camera.readout_from = FindReadoutStart(json.at("readout_from")).value();
+      const auto start = FindReadoutStart(json.at("readout_from"));
+      if (!start) throw std::runtime_error("readout_from must be top, bottom, left or right");
+      camera.readout_from = *start;
     }
     if (const auto problem = camera.Problem()) throw std::runtime_error(*problem);
     return camera;

@@ -36,9 +36,9 @@ struct RecoveryOptions {
 
 /// Matches the target's ORB features against those of `views`, one view after the other, until
 /// tracking.min_points matches agree on a relative rotation, and takes the view with the most: the
-/// way back when tracking has failed. Where fewer agree they must be min_inlier_ratio of those that
-/// look alike to be clear: after a gap of seconds, four in ten of a hundred matches agreed on
-/// rotations that were 7 to 10 deg off.
+/// way back when tracking has failed. Where fewer agree, a view of which more than min_inlier_ratio
+/// of what looks alike do goes before others, which are no more than a guide: after a gap of
+/// seconds, four in ten of a hundred matches agreed on rotations that were 7 to 10 deg off.
 /// @param views  newest first.
 /// @return  nullopt when no view matches.
 std::optional<Recovery> RecoverMotion(std::span<const OrientedView> views,

@@ -127,6 +127,10 @@ TEST_F(PanoramaCommand, SaysWhatIsWrongInOneLine) {
   summary["camera"]["readout_s"] = -1.0;
   folder.Write("summary.json", summary.dump());
   EXPECT_THAT(error(folder.path().string(), {}), HasSubstr("readout_s"));
+  summary["camera"]["readout_s"] = 0.02;
+  summary["camera"]["readout_from"] = "up";
+  folder.Write("summary.json", summary.dump());
+  EXPECT_THAT(error(folder.path().string(), {}), HasSubstr("readout_from must be top"));
 }
 
 TEST_F(PanoramaCommand, ACameraAtRestStandsStill) {

@@ -74,7 +74,6 @@ TEST(TestBaseline, FindsWhatIsAboveTheNoise) {
   EXPECT_EQ(ShareWithBaseline({.baseline_over_depth = 0.1}, {}, 50), 1.0);
 }
 
-// All matches err four times as far along one axis of the image, as on a scene of vertical edges.
 // What the lens may have wrong over a wide turn, 0.24 px, is many deviations of exact matches.
 TEST(TestBaseline, FindsWhatIsAboveTheLensErrorOfAWideTurn) {
   const auto share = [](double baseline_over_depth) {
@@ -90,6 +89,7 @@ TEST(TestBaseline, FindsWhatIsAboveTheLensErrorOfAWideTurn) {
   EXPECT_EQ(share(0.05), 1.0);
 }
 
+// All matches err four times as far along one axis of the image, as on a scene of vertical edges.
 TEST(TestBaseline, CovariancesTellAScenesEdgesFromABaseline) {
   std::mt19937_64 random(5);
   std::normal_distribution<double> normal;
