@@ -5,14 +5,10 @@
 #include <optional>
 #include <set>
 
-#include "ba/resection.h"
 #include "rotodom/averaging/anchors.h"
 #include "rotodom/types/parallel.h"
 
 namespace rotslam {
-namespace {
-
-// Position between the nearest frames that have one, linear in time.
 Eigen::Vector3d InterpolatedCenter(const CenterMap& centers,
                                    const std::vector<double>& timestamps_s,
                                    FrameId frame) {
@@ -26,7 +22,43 @@ Eigen::Vector3d InterpolatedCenter(const CenterMap& centers,
   return (1.0 - weight) * before->second + weight * after->second;
 }
 
-}  // namespace
+std::map<FrameId, ResectedPose> ResectFrames(const std::map<FrameId, ResectionStart>& starts,
+                                             const PointMap& points,
+                                             const std::vector<Track>& tracks,
+                                             const Camera& camera,
+                                             const ResectionOptions& options,
+                                             int num_threads) {
+  struct SeenFrame {
+    FrameId id;
+    const ResectionStart* start;
+    std::vector<PointSighting> sightings;
+    std::optional<ResectedPose> pose;
+  };
+  std::vector<SeenFrame> frames;
+  std::map<FrameId, int> place;
+  for (const auto& [frame, start] : starts) {
+    place[frame] = static_cast<int>(frames.size());
+    frames.push_back({frame, &start, {}, std::nullopt});
+  }
+  for (const Track& track : tracks) {
+    const auto point = points.find(track.id);
+    if (point == points.end()) continue;
+    for (const Observation& observation : track.observations) {
+      const auto seen_from = place.find(observation.frame);
+      if (seen_from == place.end()) continue;
+      frames[seen_from->second].sightings.push_back(
+          {point->second, observation.keypoint_px, observation.sigma_px});
+    }
+  }
+  ParallelFor(static_cast<int>(frames.size()), num_threads, [&](int k) {
+    frames[k].pose = ResectFrame(camera, frames[k].sightings, *frames[k].start, options);
+  });
+  std::map<FrameId, ResectedPose> poses;
+  for (const SeenFrame& frame : frames) {
+    if (frame.pose) poses[frame.id] = *frame.pose;
+  }
+  return poses;
+}
 
 void PlaceRemainingFrames(const Orientations& orientations,
                           const std::vector<Track>& all_tracks,
@@ -54,39 +86,25 @@ void PlaceRemainingFrames(const Orientations& orientations,
     }
   }
 
-  std::map<FrameId, std::vector<PointSighting>> sightings;
-  for (const Track& track : all_tracks) {
-    const auto point = result.map.point_in_world.find(track.id);
-    if (point == result.map.point_in_world.end()) continue;
-    for (const Observation& observation : track.observations) {
-      sightings[observation.frame].push_back(
-          {point->second, observation.keypoint_px, observation.sigma_px});
-    }
-  }
-  std::vector<std::optional<ResectedPose>> poses(remaining.size());
-  static const std::vector<PointSighting> kNone;
-  ParallelFor(static_cast<int>(remaining.size()), num_threads, [&](int k) {
-    const FrameId frame = remaining[k];
-    const auto seen = sightings.find(frame);
-    ResectionStart start{result.cam_from_world.at(frame),
-                         InterpolatedCenter(anchors, timestamps_s, frame),
-                         std::nullopt};
+  std::map<FrameId, ResectionStart> starts;
+  for (const FrameId frame : remaining) {
+    ResectionStart& start = starts[frame];
+    start.cam_from_world = result.cam_from_world.at(frame);
+    start.center_in_world = InterpolatedCenter(anchors, timestamps_s, frame);
     const auto covariance = rotation_covariance.find(frame);
     if (covariance != rotation_covariance.end()) start.rotation_covariance = covariance->second;
-    poses[k] = ResectFrame(
-        result.camera, seen == sightings.end() ? kNone : seen->second, start, options.resection);
-  });
-  for (std::size_t k = 0; k < remaining.size(); ++k) {
-    if (poses[k]) {
-      result.cam_from_world[remaining[k]] = poses[k]->cam_from_world;
-      result.center_in_world[remaining[k]] = poses[k]->center_in_world;
-      ++result.num_resected;
-    }
   }
+  const std::map<FrameId, ResectedPose> poses = ResectFrames(
+      starts, result.map.point_in_world, all_tracks, result.camera, options.resection, num_threads);
+  for (const auto& [frame, pose] : poses) {
+    result.cam_from_world[frame] = pose.cam_from_world;
+    result.center_in_world[frame] = pose.center_in_world;
+  }
+  result.num_resected = static_cast<int>(poses.size());
   const CenterMap known = result.center_in_world;
-  for (std::size_t k = 0; k < remaining.size(); ++k) {
-    if (poses[k]) continue;
-    result.center_in_world[remaining[k]] = InterpolatedCenter(known, timestamps_s, remaining[k]);
+  for (const FrameId frame : remaining) {
+    if (poses.contains(frame)) continue;
+    result.center_in_world[frame] = InterpolatedCenter(known, timestamps_s, frame);
     ++result.num_interpolated;
   }
 }

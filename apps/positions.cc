@@ -11,91 +11,19 @@
 #include "apps/map_views.h"
 #include "apps/mending.h"
 #include "apps/placement.h"
+#include "apps/seams.h"
 #include "apps/turning.h"
 #include "output/cloud_outliers.h"
 #include "rotodom/averaging/anchors.h"
 #include "rotodom/completion/completion.h"
-#include "rotodom/types/similarity.h"
 
 namespace rotslam {
 namespace {
-
-// How many frames on each side of a seam tell the speed there.
-constexpr int kSpeedFrames = 30;
 
 std::set<FrameId> AllFrames(const RotationMap& rotations) {
   std::set<FrameId> frames;
   for (const auto& [frame, rotation] : rotations) frames.insert(frame);
   return frames;
-}
-
-Reconstruction Moved(const Reconstruction& part, const Similarity& similarity) {
-  Reconstruction moved = part;
-  for (auto& [frame, rotation] : moved.cam_from_world) rotation = similarity.Move(rotation);
-  for (auto& [frame, center] : moved.center_in_world) center = similarity.Move(center);
-  for (auto& [track, point] : moved.point_in_world) point = similarity.Move(point);
-  return moved;
-}
-
-struct Motion {
-  Eigen::Vector3d velocity =
-      Eigen::Vector3d::Zero();  // median speed, direction of the nearest step
-  double speed = 0.0;
-};
-
-// Speed of the part near the seam: over the keyframes within kSpeedFrames of its last (or first)
-// one.
-Motion MotionAtSeam(const CenterMap& centers,
-                    const std::vector<double>& timestamps_s,
-                    bool at_end) {
-  std::vector<std::pair<FrameId, Eigen::Vector3d>> path(centers.begin(), centers.end());
-  if (at_end) std::reverse(path.begin(), path.end());
-  std::vector<double> speeds;
-  Motion motion;
-  for (std::size_t k = 1; k < path.size(); ++k) {
-    if (std::abs(path[k].first.value - path.front().first.value) > kSpeedFrames && !speeds.empty())
-      break;
-    const double seconds =
-        std::abs(timestamps_s[path[k].first.value] - timestamps_s[path[k - 1].first.value]);
-    const Eigen::Vector3d step = at_end ? Eigen::Vector3d(path[k - 1].second - path[k].second)
-                                        : Eigen::Vector3d(path[k].second - path[k - 1].second);
-    if (!(seconds > 0.0) || step.norm() == 0.0) continue;
-    if (speeds.empty()) motion.velocity = step.normalized();
-    speeds.push_back(step.norm() / seconds);
-  }
-  if (speeds.empty()) return motion;
-  std::sort(speeds.begin(), speeds.end());
-  motion.speed = speeds[speeds.size() / 2];
-  motion.velocity *= motion.speed;
-  return motion;
-}
-
-// Where and how large `part` goes behind `placed`, by continuity. `rotations` are those of all
-// frames, the placed ones refined.
-Similarity PlaceBehind(const Reconstruction& placed,
-                       const Reconstruction& part,
-                       const RotationMap& rotations,
-                       const std::vector<double>& timestamps_s,
-                       const std::vector<HeldStretch>& held) {
-  const FrameId first = part.center_in_world.begin()->first;
-  // The last placed keyframe before the part begins.
-  CenterMap earlier = placed.center_in_world;
-  std::erase_if(earlier, [&](const auto& entry) { return entry.first >= first; });
-  if (earlier.empty()) earlier = placed.center_in_world;
-  const FrameId last = earlier.rbegin()->first;
-
-  Similarity similarity;
-  similarity.turn = rotations.at(first).Inverse() * part.cam_from_world.at(first);
-  const Motion before = MotionAtSeam(earlier, timestamps_s, true);
-  const Motion after = MotionAtSeam(part.center_in_world, timestamps_s, false);
-  if (before.speed > 0.0 && after.speed > 0.0) similarity.scale = before.speed / after.speed;
-
-  Eigen::Vector3d start = earlier.rbegin()->second;
-  const HeldStretch* stretch = StretchAt(held, first);
-  const bool is_held = stretch != nullptr && StretchAt(held, last) == stretch;
-  if (!is_held) start += before.velocity * (timestamps_s[first.value] - timestamps_s[last.value]);
-  similarity.shift = start - similarity.scale * (similarity.turn * part.center_in_world.at(first));
-  return similarity;
 }
 
 std::map<FrameId, PoseCovariance> Moved(std::map<FrameId, PoseCovariance> covariances,
@@ -371,9 +299,13 @@ PositionResult MapKeyframes(const Orientations& orientations,
       component.placed_by_default = true;
       const Similarity placed = PlaceBehind(result.map,
                                             bundle.reconstruction,
-                                            result.cam_from_world,
-                                            orientations.timestamps_s,
-                                            result.held);
+                                            {result.cam_from_world,
+                                             orientations.timestamps_s,
+                                             result.held,
+                                             all_tracks,
+                                             result.camera,
+                                             options.resection,
+                                             num_threads});
       bundle.reconstruction = Moved(bundle.reconstruction, placed);
       bundle.pose_covariance = Moved(std::move(bundle.pose_covariance), placed);
     }

@@ -39,8 +39,7 @@ struct PositionResult {
 /// bundle adjustment with the keyframes' images, then the frames between keyframes.
 ///
 /// Parts of the map that no track with depth links keep their own scale (`components`). They are
-/// put together by continuity: the later part starts where the earlier one ends, or as far on as
-/// its last velocity carries, and moves as fast (median over up to 30 frames on each side).
+/// put together by continuity (PlaceBehind).
 PositionResult FindPositions(const Input& input,
                              const Orientations& orientations,
                              const PipelineOptions& options,

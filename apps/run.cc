@@ -117,7 +117,7 @@ int Run(const RunFlags& flags) {
   for (int k = 1; k < std::ssize(positions.components); ++k) {
     progress.Warn("no tracks tie the scale of the map from frame " +
                   std::to_string(FirstFrame(*summary.segments, positions.components[k], k)) +
-                  " on to the part before; it is set so that the speed is continuous");
+                  " on to the part before; it is set so that what is seen stays as far away");
   }
   if (input.guess) progress.Warn(WarningOf(*input.guess, positions.camera));
   if (positions.is_held_throughout) {

@@ -103,10 +103,11 @@ std::vector<std::string> CommentsOn(const std::vector<Segment>& segments) {
   std::vector<std::string> comments;
   for (const Segment& segment : segments) {
     if (segment.scale != "continuity") continue;
-    comments.push_back("frames " + std::to_string(segment.first_frame) + " to " +
-                       std::to_string(segment.last_frame) + ": " + segment.kind + " on part " +
-                       std::to_string(segment.component) +
-                       " of the map, whose scale nothing measures; the speed before it goes on");
+    comments.push_back(
+        "frames " + std::to_string(segment.first_frame) + " to " +
+        std::to_string(segment.last_frame) + ": " + segment.kind + " on part " +
+        std::to_string(segment.component) +
+        " of the map, whose scale nothing measures; things stay as far away as before it");
   }
   return comments;
 }

@@ -129,11 +129,9 @@ std::vector<Block> FittingBlocks(const RotationMap& cam_from_world,
 std::optional<ComponentStart> SolveInBlocks(const RotationMap& cam_from_world,
                                             const std::vector<Track>& tracks,
                                             const ViewComponent& component,
+                                            const ComponentOptions& component_options,
                                             const KrotOptions& options,
                                             const KrotUnits& units) {
-  ComponentOptions component_options;
-  component_options.min_shared_points = options.min_shared_points;
-  component_options.min_parallax_rad = units.still_rad;
   ComponentStart start;
   std::vector<Block> blocks;
   for (const std::set<FrameId>& piece :
@@ -161,13 +159,14 @@ std::optional<ComponentStart> SolveInBlocks(const RotationMap& cam_from_world,
 std::optional<ComponentStart> StartComponent(const RotationMap& cam_from_world,
                                              const std::vector<Track>& tracks,
                                              const ViewComponent& component,
+                                             const ComponentOptions& component_options,
                                              const KrotOptions& options,
                                              const KrotUnits& units) {
   const std::set<FrameId> members(component.views.begin(), component.views.end());
   std::optional<ComponentStart> start =
       component.views.size() <= static_cast<std::size_t>(options.max_lp_views)
           ? SolvePrograms(cam_from_world, TracksOf(members, tracks, units.min_z), options, units)
-          : SolveInBlocks(cam_from_world, tracks, component, options, units);
+          : SolveInBlocks(cam_from_world, tracks, component, component_options, options, units);
   if (!start || start->centers.size() == component.views.size()) return start;
   GrowthOptions growth;
   growth.resection.threshold_rad = units.loose_rad;

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <cstdlib>
+#include <limits>
 #include <map>
 #include <optional>
 #include <set>
@@ -66,27 +67,28 @@ class Grower {
         sights_(sights),
         free_views_(free_views),
         options_(options),
-        first_ray_(tracks.size()),
-        known_(tracks.size(), false) {}
+        first_sight_(tracks.size()),
+        known_(tracks.size(), 0.0) {}
 
   void Add(FrameId view) {
     component_.views.push_back(view);
     placed_.insert(view);
     num_known_.erase(view);
     for (const Sight& sight : sights_.at(view)) {
-      if (known_[sight.track]) continue;
-      std::optional<Eigen::Vector3d>& first = first_ray_[sight.track];
+      std::optional<FirstSight>& first = first_sight_[sight.track];
       if (!first) {
-        first = sight.ray_in_world;
-      } else if (Angle(*first, sight.ray_in_world) >= options_.min_parallax_rad) {
-        known_[sight.track] = true;
-        for (const Observation& observation : tracks_[sight.track].observations) {
-          if (placed_.contains(observation.frame) || !free_views_.contains(observation.frame)) {
-            continue;
-          }
-          ++num_known_[observation.frame];
-        }
+        first = {view, sight.ray_in_world};
+        continue;
       }
+      const double known = Knowledge(*first, view, sight.ray_in_world);
+      if (known <= known_[sight.track]) continue;
+      for (const Observation& observation : tracks_[sight.track].observations) {
+        if (placed_.contains(observation.frame) || !free_views_.contains(observation.frame)) {
+          continue;
+        }
+        num_known_[observation.frame] += known - known_[sight.track];
+      }
+      known_[sight.track] = known;
     }
   }
 
@@ -108,13 +110,34 @@ class Grower {
   const ViewComponent& component() const { return component_; }
 
  private:
+  struct FirstSight {
+    FrameId view;
+    Eigen::Vector3d ray_in_world;
+  };
+
+  // How much of a known point two sights make, 0 to 1.
+  double Knowledge(const FirstSight& first, FrameId view, const Eigen::Vector3d& ray) const {
+    const double parallax = Angle(first.ray_in_world, ray);
+    if (parallax >= options_.min_parallax_rad) return 1.0;
+    const double noise = std::max(NoiseOf(first.view), NoiseOf(view));
+    if (parallax < options_.min_noise_ratio * noise) return 0.0;
+    const double share = parallax / options_.min_parallax_rad;
+    return share * share;
+  }
+
+  double NoiseOf(FrameId view) const {
+    const auto noise = options_.noise_rad.find(view);
+    return noise == options_.noise_rad.end() ? std::numeric_limits<double>::infinity()
+                                             : noise->second;
+  }
+
   const std::vector<Track>& tracks_;
   const SightsOfView& sights_;
   const std::set<FrameId>& free_views_;
   const ComponentOptions& options_;
-  std::vector<std::optional<Eigen::Vector3d>> first_ray_;
-  std::vector<bool> known_;
-  std::map<FrameId, int> num_known_;  // known points seen by each view not yet placed
+  std::vector<std::optional<FirstSight>> first_sight_;
+  std::vector<double> known_;            // how much of a known point each track is
+  std::map<FrameId, double> num_known_;  // known points seen by each view not yet placed
   std::set<FrameId> placed_;
   ViewComponent component_;
 };

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <map>
 #include <vector>
 
 #include "rotodom/types/maps.h"
@@ -12,8 +13,15 @@ struct ComponentOptions {
   // A view joins when it sees at least this many points known to the component. Three determine a
   // position with one to spare; more guard against chance.
   int min_shared_points = 8;
-  // A track is a known point once two of the component's views see it under this parallax.
+  // A track is a known point once two of the component's views see it under this parallax. Under
+  // less, but more than noise makes, it counts by the square of its share of it: what many points
+  // tell of the scale goes with the sum of their squared parallaxes.
   double min_parallax_rad = 0.0;
+  // By view, what parallax is without a baseline, rad, as a standard deviation: noise and errors of
+  // the rotations. Of views without, no track under min_parallax_rad counts.
+  std::map<FrameId, double> noise_rad;
+  // More than noise is what is beyond so many of the noisier view's standard deviations.
+  double min_noise_ratio = 4.0;
 };
 
 /// Views whose positions hang together rigidly: one scale, one translation.

@@ -1,12 +1,14 @@
 #include "krot/epipolar_filter.h"
 
 #include <algorithm>
+#include <cmath>
 #include <map>
 #include <utility>
 
-#include <Eigen/Geometry>
+#include <Eigen/Dense>
 
 #include "rotodom/types/draw.h"
+#include "rotodom/types/median.h"
 
 namespace rotslam {
 namespace {
@@ -19,15 +21,19 @@ struct SharedTrack {
   Eigen::Vector3d normal;  // ray_a x ray_b, as long as the sine of the parallax
 };
 
-// Whether the two rays miss a common plane with `direction`, which is a unit vector, by an angle of
-// at most `threshold`; the smaller of the two ways to measure it, so a ray near the epipole does
-// not blow it up.
-bool ShareAPlane(const SharedTrack& shared, const Eigen::Vector3d& direction, double threshold) {
+// Squared sine of the angle by which the two rays miss a common plane with `direction`, which is a
+// unit vector; the smaller of the two ways to measure it, so a ray near the epipole does not blow
+// it up.
+double SquaredMiss(const SharedTrack& shared, const Eigen::Vector3d& direction) {
   const double volume = shared.normal.dot(direction);
+  if (volume == 0.0) return 0.0;
   const double cosine_a = direction.dot(shared.ray_a);
   const double cosine_b = direction.dot(shared.ray_b);
-  const double squared_sine = 1.0 - std::min(cosine_a * cosine_a, cosine_b * cosine_b);
-  return volume * volume <= threshold * threshold * squared_sine;
+  return volume * volume / (1.0 - std::min(cosine_a * cosine_a, cosine_b * cosine_b));
+}
+
+bool ShareAPlane(const SharedTrack& shared, const Eigen::Vector3d& direction, double threshold) {
+  return SquaredMiss(shared, direction) <= threshold * threshold;
 }
 
 int CountInliers(const std::vector<SharedTrack>& shared,
@@ -110,12 +116,38 @@ PairMap CollectShared(const RotationMap& cam_from_world,
   return pairs;
 }
 
+// Standard deviation of what the rays miss the planes by, from the median of its size. The
+// direction, good to the threshold so far, is fitted to those that agree closer and closer.
+double NoiseOf(const std::vector<SharedTrack>& shared,
+               Eigen::Vector3d direction,
+               double threshold) {
+  constexpr int kRounds = 3;
+  constexpr double kSigmasPerMedian = 1.4826;  // of a normal distribution
+  constexpr double kInlierSigmas = 2.5;
+  double noise = 0.0;
+  for (int round = 0; round < kRounds; ++round) {
+    Eigen::Matrix3d normals = Eigen::Matrix3d::Zero();
+    for (const SharedTrack& track : shared) {
+      if (!ShareAPlane(track, direction, threshold)) continue;
+      normals += track.normal * track.normal.transpose();
+    }
+    direction = Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d>(normals).eigenvectors().col(0);
+    std::vector<double> squared;
+    squared.reserve(shared.size());
+    for (const SharedTrack& track : shared) squared.push_back(SquaredMiss(track, direction));
+    noise = kSigmasPerMedian * std::sqrt(Median(std::move(squared)));
+    threshold = std::min(threshold, kInlierSigmas * noise);
+  }
+  return noise;
+}
+
 }  // namespace
 
-std::vector<ObservationIndex> FindEpipolarOutliers(const RotationMap& cam_from_world,
-                                                   const std::vector<Track>& tracks,
-                                                   const EpipolarFilterOptions& options) {
+EpipolarVerdict TestEpipolarPlanes(const RotationMap& cam_from_world,
+                                   const std::vector<Track>& tracks,
+                                   const EpipolarFilterOptions& options) {
   std::map<ObservationIndex, int> balance;  // pairs failed minus pairs passed
+  std::map<FrameId, std::vector<double>> noises;
   std::uint64_t pair_number = 0;
   for (const auto& [pair, shared] : CollectShared(cam_from_world, tracks, options)) {
     const std::uint64_t seed = options.seed * 1000003u + pair_number++;
@@ -129,12 +161,16 @@ std::vector<ObservationIndex> FindEpipolarOutliers(const RotationMap& cam_from_w
       balance[track.first] += vote;
       balance[track.second] += vote;
     }
+    const double noise = NoiseOf(shared, direction, options.threshold_rad);
+    noises[pair.first].push_back(noise);
+    noises[pair.second].push_back(noise);
   }
-  std::vector<ObservationIndex> outliers;
+  EpipolarVerdict verdict;
   for (const auto& [index, votes] : balance) {
-    if (votes > 0) outliers.push_back(index);
+    if (votes > 0) verdict.outliers.push_back(index);
   }
-  return outliers;
+  for (auto& [view, of_pairs] : noises) verdict.noise_rad[view] = Median(std::move(of_pairs));
+  return verdict;
 }
 
 }  // namespace rotslam

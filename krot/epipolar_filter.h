@@ -1,6 +1,7 @@
 #pragma once
 
 #include <cstdint>
+#include <map>
 #include <vector>
 
 #include "rotodom/types/maps.h"
@@ -25,11 +26,22 @@ struct ObservationIndex {
   auto operator<=>(const ObservationIndex&) const = default;
 };
 
-/// Observations that contradict the known rotations: off the epipolar plane in more of the tested
-/// pairs than on it. The plane of a pair is spanned by a translation direction drawn from two
-/// tracks and voted by all. Zero baseline is harmless: rays then coincide and lie on every plane.
-std::vector<ObservationIndex> FindEpipolarOutliers(const RotationMap& cam_from_world,
-                                                   const std::vector<Track>& tracks,
-                                                   const EpipolarFilterOptions& options);
+/// What the pairs of views say.
+struct EpipolarVerdict {
+  // Observations that contradict the known rotations: off the epipolar plane in more of the tested
+  // pairs than on it.
+  std::vector<ObservationIndex> outliers;
+  // By view, what its rays and those of others miss common planes by, rad, as a robust standard
+  // deviation: noise of two keypoints and errors of the rotations. Without views that have no pair
+  // with a majority.
+  std::map<FrameId, double> noise_rad;
+};
+
+/// Tests observations against the known rotations. The plane of a pair is spanned by a translation
+/// direction drawn from two tracks and voted by all. Zero baseline is harmless: rays then coincide
+/// and lie on every plane.
+EpipolarVerdict TestEpipolarPlanes(const RotationMap& cam_from_world,
+                                   const std::vector<Track>& tracks,
+                                   const EpipolarFilterOptions& options);
 
 }  // namespace rotslam

@@ -57,23 +57,25 @@ std::vector<double> TrackThresholds(const std::vector<Track>& tracks,
   return thresholds;
 }
 
-void RemoveEpipolarOutliers(const RotationMap& cam_from_world,
-                            const KrotOptions& options,
-                            const KrotUnits& units,
-                            std::vector<Track>& tracks,
-                            KrotSolution& solution) {
+// Takes out what contradicts the rotations pair by pair. Returns the views' noise, rad.
+std::map<FrameId, double> RemoveEpipolarOutliers(const RotationMap& cam_from_world,
+                                                 const KrotOptions& options,
+                                                 const KrotUnits& units,
+                                                 std::vector<Track>& tracks,
+                                                 KrotSolution& solution) {
   EpipolarFilterOptions filter;
   filter.threshold_rad = units.gamma;
   filter.seed = options.seed;
-  std::vector<ObservationIndex> outliers = FindEpipolarOutliers(cam_from_world, tracks, filter);
+  EpipolarVerdict verdict = TestEpipolarPlanes(cam_from_world, tracks, filter);
   // From the back, so that positions in front stay right.
-  std::sort(outliers.rbegin(), outliers.rend());
-  for (const ObservationIndex& index : outliers) {
+  std::sort(verdict.outliers.rbegin(), verdict.outliers.rend());
+  for (const ObservationIndex& index : verdict.outliers) {
     auto& observations = tracks[index.track].observations;
     solution.removed.push_back(
         {tracks[index.track].id, observations[index.observation].frame, RemovalReason::kEpipolar});
     observations.erase(observations.begin() + index.observation);
   }
+  return std::move(verdict.noise_rad);
 }
 
 // What the triangulation kept, as the minimax problem and its structure.
@@ -198,12 +200,13 @@ std::optional<BisectionStatus> SolveComponent(const RotationMap& cam_from_world,
                                               const std::vector<Track>& tracks,
                                               const std::vector<double>& thresholds,
                                               const ViewComponent& component,
+                                              const ComponentOptions& component_options,
                                               const KrotOptions& options,
                                               const KrotUnits& units,
                                               KrotSolution& solution) {
   const std::set<FrameId> members(component.views.begin(), component.views.end());
   std::optional<ComponentStart> start =
-      StartComponent(cam_from_world, tracks, component, options, units);
+      StartComponent(cam_from_world, tracks, component, component_options, options, units);
   if (!start) return std::nullopt;
   CenterMap& centers = start->centers;
   solution.num_programs += start->num_programs;
@@ -301,8 +304,12 @@ void Solve(const RotationMap& cam_from_world,
   std::set<FrameId> views;
   int num_usable = 0;
   int num_moving = 0;
+  ComponentOptions component_options;
+  component_options.min_shared_points = options.min_shared_points;
+  component_options.min_parallax_rad = units.still_rad;
   if (options.use_epipolar_filter) {
-    RemoveEpipolarOutliers(cam_from_world, options, units, tracks, solution);
+    component_options.noise_rad =
+        RemoveEpipolarOutliers(cam_from_world, options, units, tracks, solution);
   }
   for (const Track& track : tracks) {
     for (const Observation& observation : track.observations) views.insert(observation.frame);
@@ -320,9 +327,6 @@ void Solve(const RotationMap& cam_from_world,
                        std::to_string(num_usable) + " tracks move beyond what rotation explains";
     return;
   }
-  ComponentOptions component_options;
-  component_options.min_shared_points = options.min_shared_points;
-  component_options.min_parallax_rad = units.still_rad;
   std::vector<ViewComponent> components = FindComponents(cam_from_world, tracks, component_options);
   if (components.empty()) {
     solution.message =
@@ -334,8 +338,8 @@ void Solve(const RotationMap& cam_from_world,
   bool cancelled = false;
   for (std::size_t k = 0; k < components.size(); ++k) {
     const ViewComponent component = components[k];
-    const auto bracket =
-        SolveComponent(cam_from_world, tracks, thresholds, component, options, units, solution);
+    const auto bracket = SolveComponent(
+        cam_from_world, tracks, thresholds, component, component_options, options, units, solution);
     all_converged = all_converged && bracket == BisectionStatus::kConverged;
     cancelled = cancelled || bracket == BisectionStatus::kCancelled;
     if (!bracket) {

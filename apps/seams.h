@@ -1,0 +1,43 @@
+#pragma once
+
+#include <vector>
+
+#include "apps/placement.h"
+#include "ba/resection.h"
+#include "rotodom/camera/camera.h"
+#include "rotodom/types/held_stretch.h"
+#include "rotodom/types/maps.h"
+#include "rotodom/types/similarity.h"
+#include "rotodom/types/track.h"
+
+namespace rotslam {
+
+/// What is known of the frames around a seam.
+struct SeamSources {
+  const RotationMap& cam_from_world;  // of all frames; those that have a place as refined
+  const std::vector<double>& timestamps_s;
+  const std::vector<HeldStretch>& held;
+  const std::vector<Track>& tracks;  // of all frames
+  const Camera& camera;
+  const ResectionOptions& resection;
+  int num_threads = 1;
+};
+
+/// A map with its orientations, centres and points moved.
+Reconstruction Moved(const Reconstruction& part, const Similarity& similarity);
+
+/// Where and how large `part` goes behind what is placed already, no measurement telling its scale.
+///
+/// Scale: what the keyframes within 30 frames of the seam see is as far away on both sides, by the
+/// median. That holds better than speed does, which turns and stops change tenfold
+/// (docs/gimbal.md). Place: of frames near the seam that see points of both maps, the median; else
+/// the part starts where the other one ends, within a held stretch, or as far on as its last
+/// velocity carries.
+/// @param placed  at least one centre.
+/// @param part    in a world and scale of its own, at least one centre; the frames' orientations in
+///                `sources` are those of `placed`'s world.
+Similarity PlaceBehind(const Reconstruction& placed,
+                       const Reconstruction& part,
+                       const SeamSources& sources);
+
+}  // namespace rotslam
