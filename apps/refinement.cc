@@ -100,17 +100,45 @@ int LargestOf(const std::set<int>& parts, const RefinedComponents& refined) {
   });
 }
 
-// Whether the map that takes their place explains more than the parts do: of all that is seen now,
-// and of what the tracker saw, so that what is found new counts once and what is lost twice.
-bool ExplainsMore(const BundleResult& bundle,
-                  const std::set<int>& parts,
-                  const RefinedComponents& refined) {
-  const auto explained = [](const BundleSummary& summary) {
-    return summary.num_observations + summary.support.num_observations;
-  };
+int NumExplained(const BundleSummary& summary) {
+  return summary.num_observations + summary.support.num_observations;
+}
+
+// Whether none of the map's frames that had a place has another one now, and those that had none
+// are seen well there.
+bool AddsFramesOnly(const RelocalisedMap& map,
+                    const BundleResult& bundle,
+                    const std::set<int>& parts,
+                    const RefinedComponents& refined) {
+  // What relocalisation takes for no chance.
+  constexpr int kLeastObservations = 30;
+  std::map<FrameId, int> num_observations;
+  for (const Track& track : bundle.reconstruction.tracks) {
+    for (const Observation& observation : track.observations) {
+      ++num_observations[observation.frame];
+    }
+  }
+  return parts.size() == 1 && std::ranges::all_of(map.moved, [&](FrameId frame) {
+           return !refined.components[*parts.begin()].keyframes.contains(frame) &&
+                  num_observations[frame] >= kLeastObservations;
+         });
+}
+
+// Whether the map that takes the parts' place is better: where frames have moved it explains more,
+// of all that is seen now, and of what the tracker saw, so that what is found new counts once and
+// what is lost twice. Where frames are but added the rest need only be as before; every adjustment
+// takes and leaves some hundreds of other observations.
+bool IsBetter(const RelocalisedMap& map,
+              const BundleResult& bundle,
+              const std::set<int>& parts,
+              const RefinedComponents& refined) {
+  constexpr double kAsBefore = 0.98;
   int num_explained = 0;
-  for (const int part : parts) num_explained += explained(refined.bundles[part].summary);
-  return bundle.Usable() && explained(bundle.summary) > num_explained;
+  for (const int part : parts) num_explained += NumExplained(refined.bundles[part].summary);
+  if (!bundle.Usable()) return false;
+  if (NumExplained(bundle.summary) > num_explained) return true;
+  return NumExplained(bundle.summary) > kAsBefore * num_explained &&
+         AddsFramesOnly(map, bundle, parts, refined);
 }
 
 BundleOptions WithLensHeld(BundleOptions options) {
@@ -202,7 +230,7 @@ std::set<FrameId> RefineRelocalised(const std::vector<RelocalisedMap>& maps,
                                           is_all ? options : WithLensHeld(options),
                                           complete);
     BundleSummary& before = refined.bundles[LargestOf(parts, refined)].summary;
-    if (!ExplainsMore(bundle, parts, refined)) {
+    if (!IsBetter(map, bundle, parts, refined)) {
       AddEffort(bundle.summary, before);
       continue;
     }

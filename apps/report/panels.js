@@ -107,7 +107,7 @@ function buildNotes() {
   for (const segment of data.segments) {
     if (segment.scale !== 'continuity') continue;
     note(`Frames ${segment.first} to ${segment.last}: nothing measures the scale of this part of the map; ` +
-      'it takes over the speed before it (dashed in the view).');
+      'what is seen is taken to be as far away as before it (dashed in the view).');
   }
   if (summary.krot && !['converged', 'not_run'].includes(summary.krot.status)) {
     note('Known rotation: ' + summary.krot.status + (summary.krot.message ? ', ' + summary.krot.message : ''));

@@ -17,8 +17,8 @@ struct KeyframeOptions {
   // rotation taken out, has grown to this: less gives more keyframes than triangulation gains from.
   double min_parallax_deg = 2.0;
   // It becomes one before fewer than this share of the last keyframe's tracks is left, so that
-  // tracks link neighbouring keyframes.
-  double min_shared_ratio = 0.35;
+  // tracks link neighbouring keyframes, also where the camera turns and parallax asks for none.
+  double min_shared_ratio = 0.6;
   // And before fewer of its tracks than this share of the last keyframe's have been seen by two
   // keyframes: scale passes from one pair of keyframes to the next by points of known depth alone,
   // and a quick turn takes those away first.

@@ -211,6 +211,69 @@ TEST_F(TwoComponents, StayWhereTheOneExplainsLess) {
   ExpectEffortBeside(parts);
 }
 
+// A street of which one view is not known to the map, and what adding it brings.
+struct LostView {
+  static constexpr FrameId kLost{15};
+  static constexpr int kNumSightings = 60;
+
+  Scene scene = MakeScene(Street());
+  std::vector<Track> tracks;
+  RefinedComponents refined;
+  RelocalisedMap map;
+
+  LostView() {
+    for (const Track& track : scene.tracks) {
+      Track& known = tracks.emplace_back(track);
+      std::erase_if(known.observations,
+                    [](const Observation& seen) { return seen.frame == kLost; });
+      const bool had = known.observations.size() < track.observations.size();
+      if (known.observations.size() < 2) {
+        tracks.pop_back();
+      } else if (had && map.sightings.size() < kNumSightings) {
+        map.sightings.emplace_back(
+            track.id, *std::ranges::find_if(track.observations, [](const Observation& seen) {
+              return seen.frame == kLost;
+            }));
+      }
+    }
+    const KrotSolution krot =
+        SolveKnownRotation(scene.cam_from_world, tracks, scene.camera, KrotOptions());
+    refined = RefineComponents(scene.cam_from_world, krot, tracks, {}, scene.camera, {});
+    map.parts = {0, 1};
+    map.cam_from_world = scene.cam_from_world;
+    map.center_in_world = scene.true_center_in_world;
+    map.moved = {kLost};
+  }
+
+  bool IsAdded() {
+    return !RefineRelocalised({map}, {}, scene.camera, {}, nullptr, tracks, refined).empty();
+  }
+};
+
+TEST(RefineRelocalised, AddsAViewThoughOthersLoseSomeObservations) {
+  LostView lost;
+  ASSERT_EQ(lost.refined.components.size(), 1U);
+  ASSERT_FALSE(lost.refined.components[0].keyframes.contains(LostView::kLost));
+  // As if the map without it had been adjusted a little more luckily.
+  lost.refined.bundles[0].summary.num_observations += 3 * LostView::kNumSightings;
+  EXPECT_TRUE(lost.IsAdded());
+  EXPECT_TRUE(lost.refined.components[0].keyframes.contains(LostView::kLost));
+}
+
+TEST(RefineRelocalised, AddsNoViewAtAHighPrice) {
+  LostView lost;
+  BundleSummary& summary = lost.refined.bundles[0].summary;
+  summary.num_observations += summary.num_observations / 10;
+  EXPECT_FALSE(lost.IsAdded());
+}
+
+TEST(RefineRelocalised, AddsNoViewThatFewObservationsBearOut) {
+  LostView lost;
+  lost.map.sightings.resize(20);
+  lost.refined.bundles[0].summary.num_observations += 3 * LostView::kNumSightings;
+  EXPECT_FALSE(lost.IsAdded());
+}
+
 struct Kept {
   double outliers = 0.0;  // shares
   double inliers = 0.0;

@@ -370,8 +370,8 @@ TEST(TurnOnAnArm, KeepsTheScale) {
   EXPECT_THAT(run.error, Not(HasSubstr("no tracks tie the scale")));
 }
 
-// What holding is good for: without it the camera that turns in place goes astray, by more than a
-// tenth of its whole way (0.43 m of 2.2 m).
+// What holding is good for: without it the camera that turns in place goes astray, by 4 cm of 2.2
+// m. (By 0.4 m when parts of the map took each other's speed.)
 TEST_F(RunCommand, WithoutHoldingTheTurnInPlaceGoesAstray) {
   const TemporaryFolder folder;
   const fs::path config = folder.Write("off.yaml", "held_stretches: {enabled: false}\n");
@@ -391,7 +391,7 @@ TEST_F(RunCommand, WithoutHoldingTheTurnInPlaceGoesAstray) {
     const Eigen::Vector3d moved = poses[frame].center_in_world - poses[18].center_in_world;
     astray_m = std::max(astray_m, *metrics.scale * moved.norm());
   }
-  EXPECT_GT(astray_m, 0.1 * Compare(Truth("gimbal"), Truth("gimbal")).path_length_m);
+  EXPECT_GT(astray_m, 0.01 * Compare(Truth("gimbal"), Truth("gimbal")).path_length_m);
 }
 
 TEST_F(RunCommand, TakesFirstLastAndStride) {

@@ -50,7 +50,10 @@ std::vector<Variant> Variants() {
           {"yaw 120 blur 17", {"--blur=6", "--shutter=0.02"}},
           {"yaw 120 boxes", {"--distractors=4"}},
           {"yaw 120 1 cm", {"--lever-arm=0.01"}},
-          {"yaw 120 5 cm", {"--lever-arm=0.05"}}};
+          {"yaw 120 3 cm", {"--lever-arm=0.03"}},
+          {"yaw 120 5 cm", {"--lever-arm=0.05"}},
+          {"yaw 360 5 cm", {"--turn-deg=360", "--frames=240", "--lever-arm=0.05"}},
+          {"pitch 180 10 cm", {"--turn-axis=pitch", "--turn-deg=180", "--lever-arm=0.1"}}};
 }
 
 struct Segment {
