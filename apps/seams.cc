@@ -65,15 +65,17 @@ double DepthAtSeam(const Reconstruction& map, const CenterMap& centers, bool at_
   return Median(std::move(depths));
 }
 
-// Frames that stand near a seam, as one map has them or its points tell.
-CenterMap CentersAround(FrameId last,
-                        FrameId first,
+// Frames that stand near a seam between two, as one map has them or its points tell.
+CenterMap CentersAround(FrameId one,
+                        FrameId other,
                         const Reconstruction& map,
                         const SeamSources& sources) {
   CenterMap centers;
   std::map<FrameId, ResectionStart> starts;
-  const auto begin = sources.cam_from_world.lower_bound(FrameId{last.value - kSeamFrames});
-  const auto end = sources.cam_from_world.upper_bound(FrameId{first.value + kSeamFrames});
+  const auto begin =
+      sources.cam_from_world.lower_bound(FrameId{std::min(one, other).value - kSeamFrames});
+  const auto end =
+      sources.cam_from_world.upper_bound(FrameId{std::max(one, other).value + kSeamFrames});
   for (auto entry = begin; entry != end; ++entry) {
     const auto& [frame, rotation] = *entry;
     const auto known = map.center_in_world.find(frame);
@@ -146,23 +148,27 @@ Reconstruction Moved(const Reconstruction& part, const Similarity& similarity) {
 Similarity PlaceBehind(const Reconstruction& placed,
                        const Reconstruction& part,
                        const SeamSources& sources) {
-  const FrameId first = part.center_in_world.begin()->first;
-  // What is placed before the part begins.
-  Reconstruction earlier = placed;
-  std::erase_if(earlier.center_in_world, [&](const auto& entry) { return entry.first >= first; });
-  if (earlier.center_in_world.empty()) earlier.center_in_world = placed.center_in_world;
-  const FrameId last = earlier.center_in_world.rbegin()->first;
+  CenterMap earlier = placed.center_in_world;
+  std::erase_if(earlier, [&](const auto& entry) {
+    return entry.first >= part.center_in_world.begin()->first;
+  });
+  // The part may begin before all that is placed.
+  const bool is_behind = !earlier.empty();
+  if (!is_behind) earlier = placed.center_in_world;
+  const FrameId last = is_behind ? earlier.rbegin()->first : earlier.begin()->first;
+  const FrameId first = is_behind ? part.center_in_world.begin()->first
+                                  : std::prev(part.center_in_world.lower_bound(last))->first;
 
   Similarity similarity;
   similarity.turn = sources.cam_from_world.at(first).Inverse() * part.cam_from_world.at(first);
-  const double before = DepthAtSeam(earlier, earlier.center_in_world, true);
-  const double after = DepthAtSeam(part, part.center_in_world, false);
+  const double before = DepthAtSeam(placed, earlier, is_behind);
+  const double after = DepthAtSeam(part, part.center_in_world, !is_behind);
   if (before > 0.0 && after > 0.0) similarity.scale = before / after;
 
   const Reconstruction scaled = Moved(part, similarity);
   const HeldStretch* stretch = StretchAt(sources.held, first);
   if (stretch != nullptr && StretchAt(sources.held, last) == stretch) {
-    similarity.shift = earlier.center_in_world.at(last) - scaled.center_in_world.at(first);
+    similarity.shift = placed.center_in_world.at(last) - scaled.center_in_world.at(first);
     return similarity;
   }
   const CenterMap from = CentersAround(last, first, scaled, sources);

@@ -109,6 +109,15 @@ TEST(PlaceBehind, WhatLiesInBetweenGoesInBetween) {
   EXPECT_LT(seam.ErrorOf(seam.Place({}), 18), 0.5 * seam.Step());
 }
 
+TEST(PlaceBehind, APartBeforeAllElseGoesBefore) {
+  Seam seam;
+  seam.placed = seam.Part(20, 39);
+  seam.part = Moved(seam.Part(0, 18), seam.truth.Inverse());
+  const Similarity before = seam.Place({});
+  EXPECT_NEAR(before.scale / seam.truth.scale, 1.0, 0.1);
+  EXPECT_LT(seam.ErrorOf(before, 18), 0.5 * seam.Step());
+}
+
 TEST(PlaceBehind, WithinAHeldStretchItStandsWhereThatBegan) {
   Seam seam;
   seam.Cut(19, 24);
