@@ -173,7 +173,8 @@ Similarity PlaceBehind(const Reconstruction& placed,
   }
   const CenterMap from = CentersAround(last, first, scaled, sources);
   const CenterMap to = CentersAround(last, first, placed, sources);
-  similarity.shift = MedianStep(from, to).value_or(StepInTime(from, to, sources.timestamps_s));
+  const auto seen = MedianStep(from, to);
+  similarity.shift = seen ? *seen : StepInTime(from, to, sources.timestamps_s);
   return similarity;
 }
 

@@ -30,9 +30,9 @@ Reconstruction Moved(const Reconstruction& part, const Similarity& similarity);
 ///
 /// Scale: what the keyframes within 30 frames of the seam see is as far away on both sides, by the
 /// median. That holds better than speed does, which turns and stops change tenfold
-/// (docs/gimbal.md). Place: of frames near the seam that see points of both maps, the median; else
-/// the part starts where the other one ends, within a held stretch, or as far on as its last
-/// velocity carries.
+/// (docs/gimbal.md). Place: within a held stretch the part starts where the other one ends. Else
+/// frames near the seam that see points of both maps tell it, by the median; else the path of what
+/// is placed, interpolated or as far on as its last velocity carries.
 /// @param placed  at least one centre.
 /// @param part    in a world and scale of its own, at least one centre; the frames' orientations in
 ///                `sources` are those of `placed`'s world.

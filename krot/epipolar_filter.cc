@@ -21,19 +21,30 @@ struct SharedTrack {
   Eigen::Vector3d normal;  // ray_a x ray_b, as long as the sine of the parallax
 };
 
-// Squared sine of the angle by which the two rays miss a common plane with `direction`, which is a
-// unit vector; the smaller of the two ways to measure it, so a ray near the epipole does not blow
-// it up.
-double SquaredMiss(const SharedTrack& shared, const Eigen::Vector3d& direction) {
+// By how much two rays miss a common plane with a direction; the smaller of the two ways to measure
+// it, so a ray near the epipole does not blow it up.
+struct Miss {
+  double squared_volume;
+  double squared_sine;  // of the ray's angle to the direction
+
+  bool IsWithin(double threshold) const {
+    return squared_volume <= threshold * threshold * squared_sine;
+  }
+  double SquaredAngle() const {
+    return squared_volume == 0.0 ? 0.0 : squared_volume / squared_sine;
+  }
+};
+
+// @param direction  unit.
+Miss MissOf(const SharedTrack& shared, const Eigen::Vector3d& direction) {
   const double volume = shared.normal.dot(direction);
-  if (volume == 0.0) return 0.0;
   const double cosine_a = direction.dot(shared.ray_a);
   const double cosine_b = direction.dot(shared.ray_b);
-  return volume * volume / (1.0 - std::min(cosine_a * cosine_a, cosine_b * cosine_b));
+  return {volume * volume, 1.0 - std::min(cosine_a * cosine_a, cosine_b * cosine_b)};
 }
 
 bool ShareAPlane(const SharedTrack& shared, const Eigen::Vector3d& direction, double threshold) {
-  return SquaredMiss(shared, direction) <= threshold * threshold;
+  return MissOf(shared, direction).IsWithin(threshold);
 }
 
 int CountInliers(const std::vector<SharedTrack>& shared,
@@ -134,7 +145,8 @@ double NoiseOf(const std::vector<SharedTrack>& shared,
     direction = Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d>(normals).eigenvectors().col(0);
     std::vector<double> squared;
     squared.reserve(shared.size());
-    for (const SharedTrack& track : shared) squared.push_back(SquaredMiss(track, direction));
+    for (const SharedTrack& track : shared)
+      squared.push_back(MissOf(track, direction).SquaredAngle());
     noise = kSigmasPerMedian * std::sqrt(Median(std::move(squared)));
     threshold = std::min(threshold, kInlierSigmas * noise);
   }
