@@ -208,9 +208,19 @@ PositionResult MapKeyframes(const Orientations& orientations,
 
   result.held =
       FindHeldStretches(orientations.graph, result.cam_from_world, options.held_stretches);
+  BundleOptions bundle_options = options.ba;
+  bundle_options.num_threads = num_threads;
   const HeldStretch* everything = StretchAt(result.held, result.cam_from_world.begin()->first);
   const bool stays =
       everything != nullptr && everything->last == result.cam_from_world.rbegin()->first;
+  const auto num_held = result.held.size();
+  if (!stays) {
+    const TurnSources sources = {camera, orientations.graph, result.cam_from_world, all_tracks};
+    std::erase_if(result.held, [&](const HeldStretch& stretch) {
+      return TurnsOnAnArm(stretch, sources, options.rotodom.relative_rotation, bundle_options);
+    });
+  }
+  const bool is_on_an_arm = result.held.size() < num_held;
   // Of a camera that stays in its place a turn tells the focal length.
   const bool seeks_focal = stays && options.ba.lens.refine_focal;
   result.keyframes = SelectKeyframes(result.cam_from_world,
@@ -226,10 +236,9 @@ PositionResult MapKeyframes(const Orientations& orientations,
   RotationMap keyframe_rotations;
   for (const FrameId frame : result.keyframes)
     keyframe_rotations[frame] = result.cam_from_world.at(frame);
-  BundleOptions bundle_options = options.ba;
-  bundle_options.num_threads = num_threads;
   const auto find_turning = [&]() -> std::optional<PositionResult> {
-    if (!options.held_stretches.enabled) return std::nullopt;
+    // Of a turn on an arm another lens explains most, too.
+    if (!options.held_stretches.enabled || is_on_an_arm) return std::nullopt;
     progress.StartStage("turning in place", -1);
     const auto turning = FindTurning(
         camera, keyframe_rotations, tracks, ExplanationBy(result.bundles), bundle_options);

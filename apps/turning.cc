@@ -3,8 +3,14 @@
 #include <algorithm>
 #include <cmath>
 #include <cstdint>
+#include <iterator>
 #include <map>
+#include <set>
 #include <utility>
+
+#include "apps/refinement.h"
+#include "rotodom/tracks/keyframes.h"
+#include "rotodom/types/median.h"
 
 namespace rotslam {
 namespace {
@@ -27,6 +33,12 @@ constexpr double kMaxFocalFactor = 2.0;
 // a turn has at least.
 constexpr std::size_t kSampledEdges = 100;
 constexpr double kMinShareWithoutBaseline = 0.05;
+// The share of them that a turn in place has at least, seen through the lens found for it.
+constexpr double kInPlaceShareWithoutBaseline = 0.9;
+// What such a lens still has wrong, as BaselineTestOptions::lens_error.
+constexpr double kFoundLensError = 1e-4;
+// Frames of a turn that tell its lens.
+constexpr std::size_t kMaxLensFrames = 100;
 
 bool IsLensCredible(const Camera& given, const Camera& refined) {
   const double factor = refined.MeanFocal() / given.MeanFocal();
@@ -73,6 +85,76 @@ std::vector<BearingPair> PairsOf(const RelativeRotation& edge,
     if (next->first == track) pairs.push_back({in_i->bearing, next->second->bearing});
   }
   return pairs;
+}
+
+// Pairs of views asked for a baseline, and those that show none.
+struct PairVotes {
+  int asked = 0;
+  int without = 0;
+};
+
+PairVotes AskPairs(const std::vector<RelativeRotation>& edges,
+                   const std::vector<Track>& tracks,
+                   double focal_px,
+                   const RelativeRotationOptions& options) {
+  constexpr std::uint64_t kSeed = 1;
+  const std::vector<RelativeRotation> sample = SampleOf(edges, kSampledEdges);
+  const ObservationsOfFrames observations = ObservationsOf(sample, tracks);
+  PairVotes votes;
+  for (const RelativeRotation& edge : sample) {
+    const auto estimate = EstimateRelativeRotation(
+        PairsOf(edge, observations), edge.j_from_i, focal_px, options, kSeed);
+    if (!estimate) continue;
+    ++votes.asked;
+    votes.without += estimate->rotation_only ? 1 : 0;
+  }
+  return votes;
+}
+
+// Whether the camera rests for most of the stretch.
+bool IsRest(const HeldStretch& stretch) {
+  int num_still = 0;
+  for (const FrameRange& still : stretch.still)
+    num_still += still.last.value - still.first.value + 1;
+  return 2 * num_still > stretch.last.value - stretch.first.value + 1;
+}
+
+// The stretch and what is before and behind it, as long as the camera turns the same way there, and
+// at least half as fast as is usual in it.
+RotationMap WholeTurn(const HeldStretch& stretch, const RotationMap& cam_from_world) {
+  using Frame = RotationMap::const_iterator;
+  const auto step = [](Frame from) -> Eigen::Vector3d {
+    return (std::next(from)->second * from->second.Inverse()).Log();
+  };
+  Frame first = cam_from_world.find(stretch.first);
+  Frame last = cam_from_world.find(stretch.last);
+  Eigen::Vector3d sum = Eigen::Vector3d::Zero();
+  for (Frame frame = first; frame != last; ++frame) sum += step(frame);
+  const Eigen::Vector3d axis = sum.normalized();
+  std::vector<double> steps;
+  for (Frame frame = first; frame != last; ++frame) steps.push_back(axis.dot(step(frame)));
+  const double enough = 0.5 * Median(std::move(steps));
+  const auto goes_on = [&](Frame from) { return axis.dot(step(from)) > enough; };
+  while (first != cam_from_world.begin() && goes_on(std::prev(first))) --first;
+  while (std::next(last) != cam_from_world.end() && goes_on(last)) ++last;
+  return RotationMap(first, std::next(last));
+}
+
+// Rotations, directions and lens of a turn in place by some of its frames and tracks.
+TurningResult RefineTurnAndLens(const Camera& camera,
+                                const RotationMap& turn,
+                                const std::vector<Track>& tracks,
+                                BundleOptions options) {
+  std::vector<FrameId> frames;
+  for (const auto& [frame, rotation] : turn) frames.push_back(frame);
+  frames = SampleOf(frames, kMaxLensFrames);
+  RotationMap rotations;
+  for (const FrameId frame : frames) rotations[frame] = turn.at(frame);
+  const std::vector<Track> seen = RestrictTracks(tracks, {frames.begin(), frames.end()}, 3);
+  options.lens.refine_focal = true;
+  options.lens.refine_principal_point = true;
+  options.lens.refine_distortion = true;
+  return RefineTurning(camera, rotations, SampleOf(seen, kSampledTracks), options);
 }
 
 }  // namespace
@@ -140,19 +222,35 @@ bool PairsAllowTurning(const ViewGraph& graph,
                        const std::vector<Track>& tracks,
                        double focal_px,
                        const RelativeRotationOptions& options) {
-  constexpr std::uint64_t kSeed = 1;
-  const std::vector<RelativeRotation> edges = SampleOf(graph.edges(), kSampledEdges);
-  const ObservationsOfFrames observations = ObservationsOf(edges, tracks);
-  int num_asked = 0;
-  int num_without = 0;
-  for (const RelativeRotation& edge : edges) {
-    const auto estimate = EstimateRelativeRotation(
-        PairsOf(edge, observations), edge.j_from_i, focal_px, options, kSeed);
-    if (!estimate) continue;
-    ++num_asked;
-    num_without += estimate->rotation_only ? 1 : 0;
+  const PairVotes votes = AskPairs(graph.edges(), tracks, focal_px, options);
+  return votes.without >= kMinShareWithoutBaseline * votes.asked;
+}
+
+bool TurnsOnAnArm(const HeldStretch& stretch,
+                  const TurnSources& sources,
+                  const RelativeRotationOptions& options,
+                  const BundleOptions& bundle_options) {
+  if (IsRest(stretch)) return false;
+  const RotationMap turn = WholeTurn(stretch, sources.cam_from_world);
+  std::set<FrameId> frames;
+  for (const auto& [frame, rotation] : turn) frames.insert(frame);
+  std::vector<Track> tracks = RestrictTracks(sources.tracks, frames, 3);
+  const TurningResult in_place = RefineTurnAndLens(sources.camera, turn, tracks, bundle_options);
+  if (!in_place.Usable() || !in_place.lens_refined) return false;
+
+  std::vector<RelativeRotation> edges;
+  for (const RelativeRotation& edge : sources.graph.edges()) {
+    // Neighbours show the least of a baseline.
+    const bool are_neighbours = edge.j.value - edge.i.value == 1;
+    if (!are_neighbours && frames.contains(edge.i) && frames.contains(edge.j)) {
+      edges.push_back(edge);
+    }
   }
-  return num_without >= kMinShareWithoutBaseline * num_asked;
+  tracks = WithBearingsOf(in_place.camera, std::move(tracks));
+  RelativeRotationOptions through_found_lens = options;
+  through_found_lens.baseline.lens_error = kFoundLensError;
+  const PairVotes votes = AskPairs(edges, tracks, in_place.camera.MeanFocal(), through_found_lens);
+  return votes.without < kInPlaceShareWithoutBaseline * votes.asked;
 }
 
 }  // namespace rotslam

@@ -25,6 +25,27 @@ Camera WithFocal(Camera camera, double factor) {
   return camera;
 }
 
+// The camera of a turn stands `arm` before its axis; points are 2 to some 15 away.
+BaScene SceneOnAnArm(double arm, double sigma_px) {
+  BaScene scene = MakeScene(true);
+  std::mt19937 random(5);
+  std::normal_distribution<double> noise_px(0.0, sigma_px);
+  for (auto& [frame, center] : scene.truth.center_in_world) {
+    center = scene.truth.cam_from_world.at(frame).Inverse() * Eigen::Vector3d(0.0, 0.0, arm);
+  }
+  for (Track& track : scene.truth.tracks) {
+    for (Observation& observation : track.observations) {
+      const Eigen::Vector3d in_cam = scene.truth.cam_from_world.at(observation.frame) *
+                                     (scene.truth.point_in_world.at(track.id) -
+                                      scene.truth.center_in_world.at(observation.frame));
+      observation.keypoint_px =
+          *scene.camera.Project(in_cam) + Eigen::Vector2d(noise_px(random), noise_px(random));
+      observation.bearing = *scene.camera.Unproject(observation.keypoint_px);
+    }
+  }
+  return scene;
+}
+
 // A point seen in two frames tells nothing that the pair's epipolar geometry has not; a direction
 // does, and so does each further frame that sees the point.
 TEST(Evidence, CountsNoCheckThatMatchesHadPassedBefore) {
@@ -90,22 +111,7 @@ TEST(FindTurning, NeverBelievesThatAStreetIsATurn) {
 // distances around it. With a longer lens rotations alone explain nearly all of that within the
 // limit, and need one number less for each track, but not as closely.
 TEST(FindTurning, GivesWayToPositionsThatExplainMoreClosely) {
-  BaScene scene = MakeScene(true);
-  std::mt19937 random(5);
-  std::normal_distribution<double> noise_px(0.0, 0.2);
-  for (auto& [frame, center] : scene.truth.center_in_world) {
-    center = scene.truth.cam_from_world.at(frame).Inverse() * Eigen::Vector3d(0.0, 0.0, 0.4);
-  }
-  for (Track& track : scene.truth.tracks) {
-    for (Observation& observation : track.observations) {
-      const Eigen::Vector3d in_cam = scene.truth.cam_from_world.at(observation.frame) *
-                                     (scene.truth.point_in_world.at(track.id) -
-                                      scene.truth.center_in_world.at(observation.frame));
-      observation.keypoint_px =
-          *scene.camera.Project(in_cam) + Eigen::Vector2d(noise_px(random), noise_px(random));
-      observation.bearing = *scene.camera.Unproject(observation.keypoint_px);
-    }
-  }
+  const BaScene scene = SceneOnAnArm(0.4, 0.2);
   const BundleResult moving = RefineBundle(PerturbedProblem(scene, 0.0, 0.0), {});
   ASSERT_TRUE(moving.Usable());
   const TurningResult turning =
@@ -156,6 +162,50 @@ TEST(PairsAllowTurning, WhereNoPairSharesTracks) {
   const BaScene scene = MakeScene(false);
   EXPECT_TRUE(PairsAllowTurning(GraphOf(scene), {}, scene.camera.MeanFocal(), {}));
   EXPECT_TRUE(PairsAllowTurning({}, scene.truth.tracks, scene.camera.MeanFocal(), {}));
+}
+
+// Whether the whole of the scene, called a turn in place, is one on an arm.
+bool IsOnAnArm(const BaScene& scene, const Camera& camera) {
+  std::vector<Track> tracks = scene.truth.tracks;
+  for (Track& track : tracks) {
+    for (Observation& observation : track.observations) {
+      observation.bearing = *camera.Unproject(observation.keypoint_px);
+    }
+  }
+  const HeldStretch stretch = {FrameId{0}, FrameId{23}};
+  return TurnsOnAnArm(
+      stretch, {camera, GraphOf(scene), scene.truth.cam_from_world, tracks}, {}, {});
+}
+
+TEST(TurnsOnAnArm, SeesTheArmThroughAnyLens) {
+  const BaScene scene = SceneOnAnArm(0.2, 0.05);
+  for (const double factor : {0.995, 1.0, 1.005}) {
+    EXPECT_TRUE(IsOnAnArm(scene, WithFocal(scene.camera, factor))) << factor;
+  }
+}
+
+TEST(TurnsOnAnArm, SeesNoneWhereOnlyTheLensIsWrong) {
+  const BaScene scene = SceneOnAnArm(0.0, 0.05);
+  for (const double factor : {0.99, 0.995, 1.0, 1.005, 1.01}) {
+    EXPECT_FALSE(IsOnAnArm(scene, WithFocal(scene.camera, factor))) << factor;
+  }
+}
+
+TEST(TurnsOnAnArm, DoesNotAskACameraAtRest) {
+  const BaScene scene = SceneOnAnArm(0.2, 0.05);
+  const HeldStretch rest = {FrameId{0}, FrameId{23}, 1.0, {{FrameId{2}, FrameId{21}}}};
+  EXPECT_FALSE(
+      TurnsOnAnArm(rest,
+                   {scene.camera, GraphOf(scene), scene.truth.cam_from_world, scene.truth.tracks},
+                   {},
+                   {}));
+}
+
+TEST(TurnsOnAnArm, NotWhereNothingIsSeen) {
+  const BaScene scene = SceneOnAnArm(0.2, 0.05);
+  const HeldStretch stretch = {FrameId{0}, FrameId{23}};
+  EXPECT_FALSE(TurnsOnAnArm(
+      stretch, {scene.camera, GraphOf(scene), scene.truth.cam_from_world, {}}, {}, {}));
 }
 
 }  // namespace
