@@ -25,7 +25,6 @@ constexpr int kNumDistances = 1000;
 constexpr double kMaxSpread = 0.5;
 // What a block bends by, as a share of its scale and of its size.
 constexpr double kBend = 0.01;
-constexpr double kStandardDeviation = 1.4826;  // of a normal distribution by its median deviation
 
 // One view or point, in two blocks.
 struct Shared {
@@ -86,7 +85,7 @@ std::optional<Tie> ScaleTie(int a, int b, const std::vector<Shared>& shared) {
   if (static_cast<int>(ratios.size()) < kMinShared) return std::nullopt;
   const Spread spread = SpreadOf(ratios);
   if (spread.deviation > kMaxSpread) return std::nullopt;
-  const double sigma = kStandardDeviation * spread.deviation / std::sqrt(count);
+  const double sigma = kSigmasPerMedianDeviation * spread.deviation / std::sqrt(count);
   return Tie{a, b, Eigen::VectorXd::Constant(1, spread.median), std::hypot(sigma, kBend)};
 }
 
@@ -105,9 +104,9 @@ Tie ShiftTie(
     const Spread spread = SpreadOf(offsets);
     shift[axis] = spread.median;
     const double size = SpreadOf(places).deviation;
-    variance +=
-        std::pow(kStandardDeviation * spread.deviation, 2) / static_cast<double>(shared.size()) +
-        std::pow(kBend * size, 2);
+    variance += std::pow(kSigmasPerMedianDeviation * spread.deviation, 2) /
+                    static_cast<double>(shared.size()) +
+                std::pow(kBend * size, 2);
   }
   return {a, b, shift, std::max(std::sqrt(variance), std::numeric_limits<double>::min())};
 }

@@ -133,7 +133,6 @@ double NoiseOf(const std::vector<SharedTrack>& shared,
                Eigen::Vector3d direction,
                double threshold) {
   constexpr int kRounds = 3;
-  constexpr double kSigmasPerMedian = 1.4826;  // of a normal distribution
   constexpr double kInlierSigmas = 2.5;
   double noise = 0.0;
   for (int round = 0; round < kRounds; ++round) {
@@ -147,7 +146,7 @@ double NoiseOf(const std::vector<SharedTrack>& shared,
     squared.reserve(shared.size());
     for (const SharedTrack& track : shared)
       squared.push_back(MissOf(track, direction).SquaredAngle());
-    noise = kSigmasPerMedian * std::sqrt(Median(std::move(squared)));
+    noise = kSigmasPerMedianDeviation * std::sqrt(Median(std::move(squared)));
     threshold = std::min(threshold, kInlierSigmas * noise);
   }
   return noise;

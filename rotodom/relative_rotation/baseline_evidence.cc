@@ -76,11 +76,10 @@ class Whitening {
 
 // Robust variance of the errors across the lines: they have one dimension.
 double VarianceAcross(const std::vector<WhitenedErrors>& errors) {
-  constexpr double kFromMedian = 1.4826 * 1.4826;
   std::vector<double> squares;
   squares.reserve(errors.size());
   for (const WhitenedErrors& error : errors) squares.push_back(error.epipolar);
-  return kFromMedian * Median(std::move(squares));
+  return kSigmasPerMedianDeviation * kSigmasPerMedianDeviation * Median(std::move(squares));
 }
 
 // The most that the errors of one view pair show in any direction, in standard deviations: with

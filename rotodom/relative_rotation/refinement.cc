@@ -5,6 +5,8 @@
 
 #include <Eigen/Dense>
 
+#include "rotodom/types/median.h"
+
 namespace rotslam {
 namespace {
 
@@ -103,15 +105,14 @@ double NoiseOf(const std::vector<double>& squared_distances, double threshold, d
   const std::ptrdiff_t half = count_below(threshold * threshold) / 2;
   if (half == 0) return threshold;
   // The median by bisection of its logarithm: passes without branches are faster than sorting.
-  constexpr double kFromMedian = 1.4826;
   constexpr double kPrecision = 1.002;
-  double low = std::min(smallest / kFromMedian, threshold);
+  double low = std::min(smallest / kSigmasPerMedianDeviation, threshold);
   double high = threshold;
   while (high > kPrecision * low) {
     const double middle = std::sqrt(low * high);
     (count_below(middle * middle) > half ? high : low) = middle;
   }
-  return std::max(kFromMedian * std::sqrt(low * high), smallest);
+  return std::max(kSigmasPerMedianDeviation * std::sqrt(low * high), smallest);
 }
 
 }  // namespace rotslam

@@ -6,6 +6,9 @@
 
 namespace rotslam {
 
+/// Standard deviation of a normal distribution over the median of the distances from its mean.
+inline constexpr double kSigmasPerMedianDeviation = 1.4826;
+
 /// The middle value, the upper of the two where the count is even; `if_none` of an empty list.
 /// Cost: linear.
 inline double Median(std::vector<double> values, double if_none = 0.0) {
