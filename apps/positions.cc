@@ -215,10 +215,11 @@ PositionResult MapKeyframes(const Orientations& orientations,
       everything != nullptr && everything->last == result.cam_from_world.rbegin()->first;
   const auto num_held = result.held.size();
   if (!stays) {
-    const TurnSources sources = {camera, orientations.graph, result.cam_from_world, all_tracks};
-    std::erase_if(result.held, [&](const HeldStretch& stretch) {
-      return TurnsOnAnArm(stretch, sources, options.rotodom.relative_rotation, bundle_options);
-    });
+    result.held =
+        WithoutTurnsOnArms(std::move(result.held),
+                           {camera, orientations.graph, result.cam_from_world, all_tracks},
+                           options.rotodom.relative_rotation,
+                           bundle_options);
   }
   const bool is_on_an_arm = result.held.size() < num_held;
   // Of a camera that stays in its place a turn tells the focal length.

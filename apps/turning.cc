@@ -5,6 +5,7 @@
 #include <cstdint>
 #include <iterator>
 #include <map>
+#include <optional>
 #include <set>
 #include <utility>
 
@@ -119,6 +120,10 @@ bool IsRest(const HeldStretch& stretch) {
   return 2 * num_still > stretch.last.value - stretch.first.value + 1;
 }
 
+RotationMap RotationsOf(const HeldStretch& stretch, const RotationMap& cam_from_world) {
+  return RotationMap(cam_from_world.find(stretch.first), cam_from_world.upper_bound(stretch.last));
+}
+
 // The stretch and what is before and behind it, as long as the camera turns the same way there, and
 // at least half as fast as is usual in it.
 RotationMap WholeTurn(const HeldStretch& stretch, const RotationMap& cam_from_world) {
@@ -155,6 +160,52 @@ TurningResult RefineTurnAndLens(const Camera& camera,
   options.lens.refine_principal_point = true;
   options.lens.refine_distortion = true;
   return RefineTurning(camera, rotations, SampleOf(seen, kSampledTracks), options);
+}
+
+// What a turn looks like through the lens that suits it best.
+struct TurnThroughLens {
+  bool is_another = false;      // than the given one, which suits it less
+  bool shows_baseline = false;  // to more pairs than a turn in place
+};
+
+TurnThroughLens LookThroughItsLens(const RotationMap& turn,
+                                   const TurnSources& sources,
+                                   RelativeRotationOptions options,
+                                   const BundleOptions& bundle_options) {
+  std::set<FrameId> frames;
+  for (const auto& [frame, rotation] : turn) frames.insert(frame);
+  std::vector<Track> tracks = RestrictTracks(sources.tracks, frames, 3);
+  const TurningResult in_place = RefineTurnAndLens(sources.camera, turn, tracks, bundle_options);
+  if (!in_place.Usable() || !in_place.lens_refined) return {};
+
+  std::vector<RelativeRotation> edges;
+  for (const RelativeRotation& edge : sources.graph.edges()) {
+    // Neighbours show the least of a baseline.
+    const bool are_neighbours = edge.j.value - edge.i.value == 1;
+    if (!are_neighbours && frames.contains(edge.i) && frames.contains(edge.j)) {
+      edges.push_back(edge);
+    }
+  }
+  tracks = WithBearingsOf(in_place.camera, std::move(tracks));
+  options.baseline.lens_error = kFoundLensError;
+  const PairVotes votes = AskPairs(edges, tracks, in_place.camera.MeanFocal(), options);
+  return {true, votes.without < kInPlaceShareWithoutBaseline * votes.asked};
+}
+
+// The whole turn that the stretch is a part of, where the camera stands off its axis.
+std::optional<FrameRange> TurnOnAnArm(const HeldStretch& stretch,
+                                      const TurnSources& sources,
+                                      const RelativeRotationOptions& options,
+                                      const BundleOptions& bundle_options) {
+  if (IsRest(stretch)) return std::nullopt;
+  const auto look = [&](const RotationMap& turn) {
+    return LookThroughItsLens(turn, sources, options, bundle_options);
+  };
+  const TurnThroughLens alone = look(RotationsOf(stretch, sources.cam_from_world));
+  if (!alone.is_another) return std::nullopt;
+  const RotationMap whole = WholeTurn(stretch, sources.cam_from_world);
+  if (!alone.shows_baseline && !look(whole).shows_baseline) return std::nullopt;
+  return FrameRange{whole.begin()->first, whole.rbegin()->first};
 }
 
 }  // namespace
@@ -226,31 +277,22 @@ bool PairsAllowTurning(const ViewGraph& graph,
   return votes.without >= kMinShareWithoutBaseline * votes.asked;
 }
 
-bool TurnsOnAnArm(const HeldStretch& stretch,
-                  const TurnSources& sources,
-                  const RelativeRotationOptions& options,
-                  const BundleOptions& bundle_options) {
-  if (IsRest(stretch)) return false;
-  const RotationMap turn = WholeTurn(stretch, sources.cam_from_world);
-  std::set<FrameId> frames;
-  for (const auto& [frame, rotation] : turn) frames.insert(frame);
-  std::vector<Track> tracks = RestrictTracks(sources.tracks, frames, 3);
-  const TurningResult in_place = RefineTurnAndLens(sources.camera, turn, tracks, bundle_options);
-  if (!in_place.Usable() || !in_place.lens_refined) return false;
-
-  std::vector<RelativeRotation> edges;
-  for (const RelativeRotation& edge : sources.graph.edges()) {
-    // Neighbours show the least of a baseline.
-    const bool are_neighbours = edge.j.value - edge.i.value == 1;
-    if (!are_neighbours && frames.contains(edge.i) && frames.contains(edge.j)) {
-      edges.push_back(edge);
+std::vector<HeldStretch> WithoutTurnsOnArms(std::vector<HeldStretch> held,
+                                            const TurnSources& sources,
+                                            const RelativeRotationOptions& options,
+                                            const BundleOptions& bundle_options) {
+  std::vector<FrameRange> arms;
+  for (const HeldStretch& stretch : held) {
+    if (const auto turn = TurnOnAnArm(stretch, sources, options, bundle_options)) {
+      arms.push_back(*turn);
     }
   }
-  tracks = WithBearingsOf(in_place.camera, std::move(tracks));
-  RelativeRotationOptions through_found_lens = options;
-  through_found_lens.baseline.lens_error = kFoundLensError;
-  const PairVotes votes = AskPairs(edges, tracks, in_place.camera.MeanFocal(), through_found_lens);
-  return votes.without < kInPlaceShareWithoutBaseline * votes.asked;
+  std::erase_if(held, [&](const HeldStretch& stretch) {
+    return !IsRest(stretch) && std::any_of(arms.begin(), arms.end(), [&](const FrameRange& turn) {
+      return stretch.first <= turn.last && turn.first <= stretch.last;
+    });
+  });
+  return held;
 }
 
 }  // namespace rotslam

@@ -72,19 +72,21 @@ struct TurnSources {
   const std::vector<Track>& tracks;
 };
 
-/// Whether the camera stands some way off the axis of a turn that pairs of views, each for itself,
-/// take for one in place. Most of what such an arm moves looks like a longer lens, and up to what a
-/// calibration may have wrong a pair cannot tell it from that; but the lens is the same in all of
-/// them. So one is found for the whole turn, as far as it goes on before and behind the stretch. It
-/// is an arm where that is another lens than the given one and pairs still show a baseline through
-/// it: more than one in ten do. 0 to 3 % did on simulated turns in place, the calibration up to 1 %
-/// off; of turns on arms of 2 and 3 cm, objects 1 to 4 m away, 33 to 100 %; 23 % with 1 cm.
-/// @return  also false where too little is seen to find a lens by.
-/// Cost:    of an adjustment of rotations and directions (2,000 tracks, at most 100 frames), and of
-///          a hundred relative rotations: 0.3 to 1 s.
-bool TurnsOnAnArm(const HeldStretch& stretch,
-                  const TurnSources& sources,
-                  const RelativeRotationOptions& options,
-                  const BundleOptions& bundle_options);
+/// The stretches less those in which the camera stands some way off the axis of its turn, though
+/// pairs of views, each for itself, take it for one in place. Most of what such an arm moves looks
+/// like a longer lens, and up to what a calibration may have wrong a pair cannot tell it from that;
+/// but the lens is the same in all of them. So one is found for each stretch. Where it is the given
+/// one the camera turns in place. Where it is another one, pairs on an arm still show a baseline
+/// through it, more than one in ten, or do through that of the whole turn, as far as it goes on
+/// before and behind the stretch. On simulated turns in place 0 to 3 % did, the calibration up to
+/// 1 % off; on arms of 2 and 3 cm, objects 1 to 4 m away, 33 to 100 %; 23 % with 1 cm.
+/// A stretch stays, too, where the camera rests for most of it, and where too little is seen to
+/// find a lens by. Of one turn all stretches go or none.
+/// Cost:    of one or two adjustments of rotations and directions (2,000 tracks, at most 100
+///          frames) and of a hundred relative rotations: 0.3 to 1 s a stretch.
+std::vector<HeldStretch> WithoutTurnsOnArms(std::vector<HeldStretch> held,
+                                            const TurnSources& sources,
+                                            const RelativeRotationOptions& options,
+                                            const BundleOptions& bundle_options);
 
 }  // namespace rotslam
