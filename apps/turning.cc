@@ -38,6 +38,8 @@ constexpr double kMinShareWithoutBaseline = 0.05;
 constexpr double kInPlaceShareWithoutBaseline = 0.9;
 // What such a lens still has wrong, as BaselineTestOptions::lens_error.
 constexpr double kFoundLensError = 1e-4;
+// A calibration is no farther off than so many times BaselineTestOptions::lens_error.
+constexpr double kCredibleErrors = 3.0;
 // Frames of a turn that tell its lens.
 constexpr std::size_t kMaxLensFrames = 100;
 
@@ -165,6 +167,7 @@ TurningResult RefineTurnAndLens(const Camera& camera,
 // What a turn looks like through the lens that suits it best.
 struct TurnThroughLens {
   bool is_another = false;      // than the given one, which suits it less
+  bool is_credible = true;      // as near to it as a calibration should be
   bool shows_baseline = false;  // to more pairs than a turn in place
 };
 
@@ -187,9 +190,12 @@ TurnThroughLens LookThroughItsLens(const RotationMap& turn,
     }
   }
   tracks = WithBearingsOf(in_place.camera, std::move(tracks));
+  const double credible_change = kCredibleErrors * options.baseline.lens_error;
   options.baseline.lens_error = kFoundLensError;
   const PairVotes votes = AskPairs(edges, tracks, in_place.camera.MeanFocal(), options);
-  return {true, votes.without < kInPlaceShareWithoutBaseline * votes.asked};
+  const double change = std::abs(in_place.camera.MeanFocal() / sources.camera.MeanFocal() - 1.0);
+  return {
+      true, change <= credible_change, votes.without < kInPlaceShareWithoutBaseline * votes.asked};
 }
 
 // The whole turn that the stretch is a part of, where the camera stands off its axis.
@@ -204,7 +210,9 @@ std::optional<FrameRange> TurnOnAnArm(const HeldStretch& stretch,
   const TurnThroughLens alone = look(RotationsOf(stretch, sources.cam_from_world));
   if (!alone.is_another) return std::nullopt;
   const RotationMap whole = WholeTurn(stretch, sources.cam_from_world);
-  if (!alone.shows_baseline && !look(whole).shows_baseline) return std::nullopt;
+  if (!alone.shows_baseline && (alone.is_credible || !look(whole).shows_baseline)) {
+    return std::nullopt;
+  }
   return FrameRange{whole.begin()->first, whole.rbegin()->first};
 }
 
