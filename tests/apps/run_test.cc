@@ -2,9 +2,7 @@
 // truth.
 
 #include <algorithm>
-#include <cmath>
 #include <filesystem>
-#include <iomanip>
 #include <map>
 #include <sstream>
 #include <string>
@@ -434,50 +432,6 @@ TEST(TurnInPlace, WithoutHoldingGoesAstray) {
   const fs::path on = folder.Write("on.yaml", "held_stretches: {enabled: true}\n");
   EXPECT_GT(StrayingInTurn(sequence, off), 0.1);
   EXPECT_EQ(StrayingInTurn(sequence, on), 0.0);
-}
-
-// Ahead for 20 frames, then for 60 to the right by 1.5 deg a frame, in frames 35 to 65 of which the
-// camera stands; a KITTI pose file.
-std::string PathWithAStopAmidATurn() {
-  constexpr double kStep = 0.05;
-  std::ostringstream poses;
-  poses << std::setprecision(9);
-  Eigen::Vector3d center = Eigen::Vector3d::Zero();
-  double heading = 0.0;
-  for (int frame = 0; frame < 100; ++frame) {
-    const double c = std::cos(heading);
-    const double s = std::sin(heading);
-    poses << c << " 0 " << s << " " << center.x() << " 0 1 0 0 " << -s << " 0 " << c << " "
-          << center.z() << "\n";
-    if (frame < 35 || frame >= 65) center += kStep * Eigen::Vector3d(s, 0.0, c);
-    if (frame >= 20 && frame < 80) heading += 1.5 * kRadFromDeg;
-  }
-  return poses.str();
-}
-
-// The camera moves before and behind the stop though it turns there the same way.
-TEST(TurnInPlace, IsHeldAmidATurn) {
-  const TemporaryFolder folder;
-  const fs::path sequence = folder.path() / "stop";
-  const fs::path poses = folder.Write("poses.txt", PathWithAStopAmidATurn());
-  const CommandResult simulated = Rotslam({"simulate",
-                                           "street",
-                                           "--poses=" + poses.string(),
-                                           "--width=320",
-                                           "--height=120",
-                                           "--hfov-deg=80",
-                                           "--out=" + sequence.string()});
-  ASSERT_EQ(simulated.exit_code, 0) << simulated.error;
-  const fs::path out = folder.path() / "out";
-  const CommandResult run =
-      Rotslam({"run", sequence.string(), "--no-report", "--out=" + out.string()});
-  ASSERT_EQ(run.exit_code, 0) << run.error;
-  const Trajectory held = ReadTrajectory(out / "trajectory_tum.txt");
-  for (int frame = 40; frame <= 60; ++frame) {
-    EXPECT_EQ(held.at(frame).center_in_world, held.at(40).center_in_world) << frame;
-  }
-  EXPECT_NE(held.at(30).center_in_world, held.at(40).center_in_world);
-  EXPECT_NE(held.at(70).center_in_world, held.at(60).center_in_world);
 }
 
 TEST_F(RunCommand, TakesFirstLastAndStride) {
