@@ -28,6 +28,7 @@ struct SimulateFlags {
   double fy = 0.0;
   double cx = -1.0;
   double cy = -1.0;
+  double readout_s = 0.0;
 };
 
 Camera CameraOf(const SimulateFlags& flags) {
@@ -44,6 +45,7 @@ Camera CameraOf(const SimulateFlags& flags) {
   if (flags.fy > 0.0) camera.fy = flags.fy;
   if (flags.cx >= 0.0) camera.cx = flags.cx;
   if (flags.cy >= 0.0) camera.cy = flags.cy;
+  camera.readout_s = flags.readout_s;
   return camera;
 }
 
@@ -143,6 +145,11 @@ void AddSimulateCommand(CLI::App& app, Action& action) {
       ->excludes(camera);
   command->add_option("--cx", flags->cx, "Principal point; default: the middle")->excludes(camera);
   command->add_option("--cy", flags->cy, "Principal point; default: the middle")->excludes(camera);
+  command
+      ->add_option("--readout",
+                   flags->readout_s,
+                   "Rolling shutter: seconds from the first row to the last; 0: a global one")
+      ->excludes(camera);
   command->add_option("--noise", render.noise_grey, "Sensor noise, sigma in grey levels")
       ->capture_default_str();
   command->add_option("--exposure", render.exposure_variation, "Gain wanders within 1 +- this")

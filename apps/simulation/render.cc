@@ -94,15 +94,17 @@ Colour Radiance(
 
 class ViewRenderer {
  public:
+  // @param poses  one per step of rays.ExposureTimes().
   ViewRenderer(const Scene& scene,
                const PixelRays& rays,
-               const StampedPose& pose,
+               const std::vector<StampedPose>& poses,
                const RenderOptions& options)
-      : scene_(scene),
-        rays_(rays),
-        R_w_c_(pose.world_from_cam.Matrix()),
-        center_(pose.center_in_world),
-        options_(options) {}
+      : scene_(scene), rays_(rays), options_(options) {
+    standpoints_.reserve(poses.size());
+    for (const StampedPose& pose : poses) {
+      standpoints_.push_back({pose.world_from_cam.Matrix(), pose.center_in_world});
+    }
+  }
 
   // Adds weight * light to `sum`, row by row.
   void AddTo(std::vector<Colour>& sum, float weight) const {
@@ -115,64 +117,80 @@ class ViewRenderer {
       CastRow(y + 1, below);
       for (int x = 0; x < width; ++x) {
         if (rays_.Center(x, y).isZero(0.0)) continue;  // stays black
+        const Standpoint& from = standpoints_[rays_.ExposureOfCenter(x, y)];
+        const Ray ray{from.center, from.R_w_c * rays_.Center(x, y)};
         const Corner* corners[4] = {&above[x], &above[x + 1], &below[x], &below[x + 1]};
-        sum[static_cast<std::size_t>(y) * width + x] +=
-            weight * PixelLight(R_w_c_ * rays_.Center(x, y), corners);
+        sum[static_cast<std::size_t>(y) * width + x] += weight * PixelLight(ray, corners);
       }
     }
   }
 
  private:
+  struct Standpoint {
+    Eigen::Matrix3d R_w_c;
+    Vector3d center;
+  };
+
+  // In the world.
+  struct Ray {
+    Vector3d origin;
+    Vector3d direction;
+
+    Vector3d At(double distance) const { return origin + distance * direction; }
+  };
+
   struct Corner {
     Vector3d direction = Vector3d::Zero();
     Scene::Hit hit;
     Vector2d st = Vector2d::Zero();
   };
 
-  Vector2d TextureAt(const Scene::Hit& hit, const Vector3d& direction, double distance) const {
-    if (hit.world == nullptr) return SkyCoordinates(direction);
-    return hit.world->TextureCoordinates(hit.surface, center_ + distance * direction);
+  static Vector2d TextureAt(const Scene::Hit& hit, const Ray& ray, double distance) {
+    if (hit.world == nullptr) return SkyCoordinates(ray.direction);
+    return hit.world->TextureCoordinates(hit.surface, ray.At(distance));
   }
 
   void CastRow(int y, std::vector<Corner>& row) const {
     Scene::Hit guess;
     for (int x = 0; x <= rays_.Width(); ++x) {
       Corner& corner = row[x];
-      const Vector3d& ray = rays_.Corner(x, y);
-      if (ray.isZero(0.0)) {
+      const Vector3d& in_cam = rays_.Corner(x, y);
+      if (in_cam.isZero(0.0)) {
         corner = {};
         continue;
       }
-      corner.direction = R_w_c_ * ray;
-      corner.hit = scene_.Cast(center_, corner.direction, guess);
-      corner.st = TextureAt(corner.hit, corner.direction, corner.hit.distance);
+      const Standpoint& from = standpoints_[rays_.ExposureOfCorner(x, y)];
+      const Ray ray{from.center, from.R_w_c * in_cam};
+      corner.direction = ray.direction;
+      corner.hit = scene_.Cast(ray.origin, ray.direction, guess);
+      corner.st = TextureAt(corner.hit, ray, corner.hit.distance);
       guess = corner.hit;
     }
   }
 
-  Colour PixelLight(const Vector3d& direction, const Corner* const corners[4]) const {
+  Colour PixelLight(const Ray& ray, const Corner* const corners[4]) const {
     bool one_sheet = true;
     for (int k = 0; k < 4; ++k) {
       one_sheet = one_sheet && !corners[k]->direction.isZero(0.0) &&
                   corners[k]->hit.SameSheet(corners[0]->hit);
     }
-    return one_sheet ? SheetLight(direction, corners) : EdgeLight(direction, corners);
+    return one_sheet ? SheetLight(ray, corners) : EdgeLight(ray, corners);
   }
 
   // All of the pixel shows one sheet: average its texture over the pixel's footprint.
-  Colour SheetLight(const Vector3d& direction, const Corner* const corners[4]) const {
+  Colour SheetLight(const Ray& ray, const Corner* const corners[4]) const {
     const Scene::Hit& hit = corners[0]->hit;
     const bool sky = hit.world == nullptr;
-    const double distance = sky ? 0.0 : hit.world->DistanceToPlane(hit.surface, center_, direction);
-    const Vector2d st = TextureAt(hit, direction, distance);
+    const double distance =
+        sky ? 0.0 : hit.world->DistanceToPlane(hit.surface, ray.origin, ray.direction);
+    const Vector2d st = TextureAt(hit, ray, distance);
     const Vector2d dx =
         0.5 * ((corners[1]->st - corners[0]->st) + (corners[3]->st - corners[2]->st));
     const Vector2d dy =
         0.5 * ((corners[2]->st - corners[0]->st) + (corners[3]->st - corners[1]->st));
     const Material& material =
         sky ? scene_.Still().Sky() : hit.world->Surfaces()[hit.surface].material;
-    const double light =
-        sky ? 1.0 : Illumination(*hit.world, hit.surface, center_ + distance * direction);
+    const double light = sky ? 1.0 : Illumination(*hit.world, hit.surface, ray.At(distance));
     // Axes of the footprint: eigenvectors of dx dx' + dy dy'.
     const double a = dx.x() * dx.x() + dy.x() * dy.x();
     const double b = dx.x() * dx.y() + dy.x() * dy.y();
@@ -196,10 +214,10 @@ class ViewRenderer {
   }
 
   // Surfaces meet within the pixel: cast rays of its own through a grid of places.
-  Colour EdgeLight(const Vector3d& direction, const Corner* const corners[4]) const {
+  Colour EdgeLight(const Ray& middle, const Corner* const corners[4]) const {
     Vector3d directions[4];
     for (int k = 0; k < 4; ++k) {
-      directions[k] = corners[k]->direction.isZero(0.0) ? direction : corners[k]->direction;
+      directions[k] = corners[k]->direction.isZero(0.0) ? middle.direction : corners[k]->direction;
     }
     const int n = options_.edge_samples;
     const double pixel_angle = (directions[3] - directions[0]).norm() / std::numbers::sqrt2;
@@ -209,16 +227,16 @@ class ViewRenderer {
       const double y = (j + 0.5) / n;
       for (int i = 0; i < n; ++i) {
         const double x = (i + 0.5) / n;
-        const Vector3d ray = (1.0 - y) * ((1.0 - x) * directions[0] + x * directions[1]) +
-                             y * ((1.0 - x) * directions[2] + x * directions[3]);
-        guess = scene_.Cast(center_, ray, guess);
+        const Ray ray{middle.origin,
+                      (1.0 - y) * ((1.0 - x) * directions[0] + x * directions[1]) +
+                          y * ((1.0 - x) * directions[2] + x * directions[3])};
+        guess = scene_.Cast(ray.origin, ray.direction, guess);
         const Vector2d st = TextureAt(guess, ray, guess.distance);
         if (guess.world == nullptr) {
           sum += Radiance(scene_.Still().Sky(), st, kSkyRadius * pixel_angle, 1.0, options_.color);
           continue;
         }
-        const double light =
-            Illumination(*guess.world, guess.surface, center_ + guess.distance * ray);
+        const double light = Illumination(*guess.world, guess.surface, ray.At(guess.distance));
         sum += Radiance(guess.world->Surfaces()[guess.surface].material,
                         st,
                         0.7 * pixel_angle * guess.distance,
@@ -231,9 +249,8 @@ class ViewRenderer {
 
   const Scene& scene_;
   const PixelRays& rays_;
-  const Eigen::Matrix3d R_w_c_;
-  const Vector3d center_;
   const RenderOptions& options_;
+  std::vector<Standpoint> standpoints_;
 };
 
 // Gain of the exposure at a time: slow waves whose phases the seed turns, within 1 +- variation.
@@ -285,6 +302,14 @@ PixelRays::PixelRays(const Camera& camera) : width_(camera.width), height_(camer
   for (int y = 0; y <= height_; ++y) {
     for (int x = 0; x <= width_; ++x) corners_.push_back(ray(x - 0.5, y - 0.5));
   }
+  if (camera.readout_s == 0.0) return;
+  is_sideways_ =
+      camera.readout_from == ReadoutStart::kLeft || camera.readout_from == ReadoutStart::kRight;
+  exposure_s_.clear();
+  const int num_steps = 2 * (is_sideways_ ? width_ : height_) + 1;
+  for (int step = 0; step < num_steps; ++step) {
+    exposure_s_.push_back(camera.ExposureTime(Vector2d::Constant(0.5 * (step - 1))));
+  }
 }
 
 cv::Mat RenderFrame(const World& world,
@@ -303,8 +328,9 @@ cv::Mat RenderFrame(const World& world,
   for (int k = 0; k < count; ++k) {
     const double instant_s = time_s + options.shutter_s * ((k + 0.5) / count - 0.5);
     const Scene scene(world, moving, instant_s);
-    ViewRenderer(scene, rays, pose_at(instant_s), options)
-        .AddTo(sum, 1.0f / static_cast<float>(count));
+    std::vector<StampedPose> poses;
+    for (const double late_s : rays.ExposureTimes()) poses.push_back(pose_at(instant_s + late_s));
+    ViewRenderer(scene, rays, poses, options).AddTo(sum, 1.0f / static_cast<float>(count));
   }
   const auto gain = static_cast<float>(255.0 * Gain(options, time_s));
   const auto noise = static_cast<float>(options.noise_grey);

@@ -39,7 +39,8 @@ struct RenderOptions {
   }
 };
 
-/// Bearings of a camera's pixel centres and pixel corners, computed once for all its pictures.
+/// Bearings of a camera's pixel centres and pixel corners, and when they are exposed, computed once
+/// for all its pictures.
 class PixelRays {
  public:
   /// Throws std::invalid_argument where camera.Problem() or the camera has no size.
@@ -52,20 +53,37 @@ class PixelRays {
   /// Top left corner of pixel (x, y); x up to Width(), y up to Height().
   const Eigen::Vector3d& Corner(int x, int y) const { return corners_[index(x, y, width_ + 1)]; }
 
+  /// Seconds after the middle of the frame, in steps of half a row (or column, where the readout
+  /// runs sideways): even ones are the edges between rows, odd ones their middles. One step, zero,
+  /// with a global shutter.
+  const std::vector<double>& ExposureTimes() const { return exposure_s_; }
+  /// Which of them a pixel centre or corner has.
+  int ExposureOfCenter(int x, int y) const { return ExposureStep(2 * x + 1, 2 * y + 1); }
+  int ExposureOfCorner(int x, int y) const { return ExposureStep(2 * x, 2 * y); }
+
  private:
   static std::size_t index(int x, int y, int width) {
     return static_cast<std::size_t>(y) * static_cast<std::size_t>(width) +
            static_cast<std::size_t>(x);
   }
 
+  int ExposureStep(int half_columns, int half_rows) const {
+    if (exposure_s_.size() == 1) return 0;
+    return is_sideways_ ? half_columns : half_rows;
+  }
+
   int width_ = 0;
   int height_ = 0;
+  bool is_sideways_ = false;
+  std::vector<double> exposure_s_ = {0.0};
   std::vector<Eigen::Vector3d> centers_;
   std::vector<Eigen::Vector3d> corners_;
 };
 
-/// Renders what the camera sees at a time.
-/// @param pose_at   pose as a function of time; asked at `time_s` and, with blur, around it.
+/// Renders what the camera sees at a time, which is that of the middle of the picture where its
+/// shutter rolls; moving boxes stand still meanwhile.
+/// @param pose_at   pose as a function of time; asked at `time_s` and, with blur or a rolling
+///                  shutter, around it.
 /// @param frame     number of the picture; keys its noise together with options.seed.
 /// @return  CV_8UC1, or CV_8UC3 with options.color. A pure function of its arguments.
 /// Cost:    two to three tenths of a microsecond a pixel and sub-frame, one ray and about one

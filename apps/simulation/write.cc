@@ -141,6 +141,10 @@ std::vector<std::string> WriteSequence(const Simulation& simulation,
                                        const fs::path& out,
                                        const WriteOptions& options) {
   const bool euroc = options.layout == SequenceLayout::kEuroc;
+  if (euroc && simulation.GetCamera().readout_s > 0.0) {
+    throw std::invalid_argument(
+        "EuRoC's sensor.yaml has no place for a rolling shutter; use the layout tum");
+  }
   const fs::path folder = euroc ? "mav0/cam0/data" : "rgb";
   const int count = simulation.NumFrames();
   std::vector<std::string> names;

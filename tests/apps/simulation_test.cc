@@ -212,6 +212,42 @@ TEST(RenderFrame, PixelIsTheAverageOverItsSquare) {
   }
 }
 
+// Every row of a rolling shutter's picture is that row of a picture taken at its time.
+class RolledPicture : public testing::TestWithParam<ReadoutStart> {};
+INSTANTIATE_TEST_SUITE_P(ReadoutStarts,
+                         RolledPicture,
+                         testing::Values(ReadoutStart::kTop, ReadoutStart::kRight),
+                         [](const auto& start) { return Name(start.param); });
+
+TEST_P(RolledPicture, IsMadeOfPicturesAtTheTimesOfItsRows) {
+  SimulationOptions options = WithoutSensor(Small(SimulationKind::kHandheld));
+  const Simulation global(options);
+  Camera rolling = global.GetCamera();
+  rolling.readout_s = 0.025;
+  rolling.readout_from = GetParam();
+  const World world = MakeRoom(options.seed);
+  const auto pose_at = [&](double time_s) { return global.PoseAt(time_s); };
+  const auto picture = [&](const Camera& camera, double time_s) {
+    return RenderFrame(world, {}, PixelRays(camera), pose_at, time_s, 0, options.render);
+  };
+  const double time_s = global.Truth()[3].timestamp_s;
+  const cv::Mat rolled = picture(rolling, time_s);
+  const bool is_sideways = GetParam() == ReadoutStart::kRight;
+  const auto line = [&](const cv::Mat& image, int index) {
+    return is_sideways ? image.col(index) : image.row(index);
+  };
+  const int count = is_sideways ? rolled.cols : rolled.rows;
+  for (const int index : {0, count / 3, count - 1}) {
+    const double late_s = rolling.ExposureTime(Eigen::Vector2d::Constant(index));
+    const cv::Mat then = line(picture(global.GetCamera(), time_s + late_s), index);
+    const cv::Mat middle = line(picture(global.GetCamera(), time_s), index);
+    // Pixels stretch a little from one row to the next.
+    EXPECT_LT(cv::norm(line(rolled, index), then, cv::NORM_L1),
+              0.2 * cv::norm(middle, then, cv::NORM_L1))
+        << index;
+  }
+}
+
 TEST(Simulation, OrbFindsThousandsOfCornersSpreadOverTheImage) {
   for (const SimulationKind kind : kKinds) {
     SimulationOptions options;
