@@ -5,8 +5,9 @@
 #include <iterator>
 #include <memory>
 #include <optional>
+#include <vector>
 
-#include "rotodom/tracking/shutter.h"
+#include "apps/placement.h"
 
 namespace rotslam {
 
@@ -38,26 +39,41 @@ MapViews ReadMapViews(const std::string& path,
   return views;
 }
 
-void SetMotions(const Orientations& orientations, const Reconstruction& map, MapViews& views) {
-  const auto last_frame = static_cast<int>(orientations.timestamps_s.size()) - 1;
+void SetMotions(const MotionSources& sources, const Reconstruction& map, MapViews& views) {
+  if (sources.camera.readout_s == 0.0) return;
+  const RotationMap& cam_from_world = sources.orientations.cam_from_world;
+  const auto time_s = [&](FrameId id) { return sources.orientations.timestamps_s[id.value]; };
+  std::map<FrameId, ResectionStart> starts;
   for (auto& [frame, view] : views) {
-    const FrameId before{std::max(0, frame.value - 1)};
-    const FrameId after{std::min(last_frame, frame.value + 1)};
-    const auto time_s = [&](FrameId id) { return orientations.timestamps_s[id.value]; };
-    const auto first = orientations.cam_from_world.find(before);
-    const auto second = orientations.cam_from_world.find(after);
-    if (first != orientations.cam_from_world.end() && second != orientations.cam_from_world.end() &&
-        time_s(after) > time_s(before)) {
-      view.rate =
-          (second->second * first->second.Inverse()).Log() / (time_s(after) - time_s(before));
-    }
+    constexpr int kOrientations = 4;
+    view.motion = MotionAt(frame, cam_from_world, time_s, kOrientations);
     const auto center = map.center_in_world.find(frame);
     if (center == map.center_in_world.end()) continue;
-    const auto next = std::next(center);
-    const auto to = next == map.center_in_world.end() ? center : next;
-    const auto from = center == map.center_in_world.begin() ? center : std::prev(center);
-    const double seconds = time_s(to->first) - time_s(from->first);
-    if (seconds > 0.0) view.velocity = (to->second - from->second) / seconds;
+    for (const FrameId next : {FrameId{frame.value - 1}, FrameId{frame.value + 1}}) {
+      const auto rotation = cam_from_world.find(next);
+      if (rotation == cam_from_world.end()) continue;
+      ResectionStart& start = starts[next];
+      start.cam_from_world =
+          rotation->second * cam_from_world.at(frame).Inverse() * map.cam_from_world.at(frame);
+      start.center_in_world = center->second;
+    }
+  }
+  const std::map<FrameId, ResectedPose> poses = ResectFrames(starts,
+                                                             map.point_in_world,
+                                                             sources.tracks,
+                                                             sources.camera,
+                                                             sources.resection,
+                                                             sources.num_threads);
+  for (auto& [frame, view] : views) {
+    const auto center = map.center_in_world.find(frame);
+    if (center == map.center_in_world.end()) continue;
+    std::vector<TimedOffset> ways;
+    for (const FrameId next : {FrameId{frame.value - 1}, FrameId{frame.value + 1}}) {
+      const auto pose = poses.find(next);
+      if (pose == poses.end()) continue;
+      ways.push_back({time_s(next) - time_s(frame), pose->second.center_in_world - center->second});
+    }
+    view.velocity = PolynomialThrough(ways).col(0);
   }
 }
 
@@ -70,7 +86,7 @@ std::map<FrameId, Features> DescribeViews(const MapViews& views,
     Features& corners = described[frame];
     corners = ExtractFeatures(view.image, frame, camera, options, num_threads);
     corners.rgb = {};
-    MoveToMidFrame(camera, view.rate, corners);
+    MoveToMidFrame(camera, view.motion, corners);
   }
   return described;
 }

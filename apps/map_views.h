@@ -6,6 +6,7 @@
 #include <string>
 
 #include "apps/orientations.h"
+#include "ba/resection.h"
 #include "rotodom/completion/completion.h"
 #include "rotodom/features/features.h"
 #include "rotodom/sequence/sequence.h"
@@ -20,9 +21,18 @@ MapViews ReadMapViews(const std::string& path,
                       const std::set<FrameId>& frames,
                       const std::function<void(const std::string&)>& tell);
 
-/// Gives the views the motion that a rolling shutter sees: the rotation rate between the frames
-/// before and after each, the velocity between the views of the map before and after.
-void SetMotions(const Orientations& orientations, const Reconstruction& map, MapViews& views);
+/// What tells how the camera moved around the views of a map.
+struct MotionSources {
+  const Orientations& orientations;
+  const std::vector<Track>& tracks;  // of all frames
+  const Camera& camera;
+  const ResectionOptions& resection;
+  int num_threads = 1;
+};
+
+/// Gives the views the motion that a rolling shutter sees: the turn through the frames before and
+/// behind each, and the velocity through where these stand by the map's points.
+void SetMotions(const MotionSources& sources, const Reconstruction& map, MapViews& views);
 
 /// Described corners of the views, where a global shutter would see them.
 std::map<FrameId, Features> DescribeViews(const MapViews& views,

@@ -134,13 +134,18 @@ using ViewReader =
 
 ViewReader ReaderOf(const Input& input,
                     const Orientations& orientations,
-                    const SequenceOptions& options,
+                    const std::vector<Track>& all_tracks,
+                    const PipelineOptions& options,
+                    int num_threads,
                     Progress& progress) {
-  return [&](const Reconstruction& map, const std::set<FrameId>& frames) {
-    MapViews views = ReadMapViews(input.path, options, frames, [&](const std::string& problem) {
-      progress.Warn(problem + "; points are not looked for in images that cannot be read again");
-    });
-    SetMotions(orientations, map, views);
+  return [&, num_threads](const Reconstruction& map, const std::set<FrameId>& frames) {
+    MapViews views =
+        ReadMapViews(input.path, options.sequence, frames, [&](const std::string& problem) {
+          progress.Warn(problem +
+                        "; points are not looked for in images that cannot be read again");
+        });
+    SetMotions(
+        {orientations, all_tracks, input.camera, options.resection, num_threads}, map, views);
     return views;
   };
 }
@@ -359,13 +364,14 @@ PositionResult FindPositions(const Input& input,
                              Progress& progress) {
   progress.StartStage("tracks", -1);
   std::vector<Track> all_tracks = TracksOf(orientations);
-  PositionResult result = MapKeyframes(orientations,
-                                       all_tracks,
-                                       input.camera,
-                                       ReaderOf(input, orientations, options.sequence, progress),
-                                       options,
-                                       num_threads,
-                                       progress);
+  PositionResult result =
+      MapKeyframes(orientations,
+                   all_tracks,
+                   input.camera,
+                   ReaderOf(input, orientations, all_tracks, options, num_threads, progress),
+                   options,
+                   num_threads,
+                   progress);
   if (result.components.empty()) return result;
 
   progress.StartStage("frames between keyframes", -1);

@@ -12,6 +12,7 @@
 #include "rotodom/averaging/averaging.h"
 #include "rotodom/averaging/orientation_covariance.h"
 #include "rotodom/tracking/recovery.h"
+#include "rotodom/tracking/shutter.h"
 #include "rotodom/tracking/tracking.h"
 #include "rotodom/view_graph/connect.h"
 
@@ -72,10 +73,10 @@ struct FrameEstimate {
   FrameId settled;
   std::optional<Eigen::Matrix3d> settled_covariance;
   std::vector<Connection> connections;  // the frame's edges, to the newest view first
-  // Edges and features of the frame before, measured again now that its rotation rate is known
-  // better; for a rolling shutter only.
+  // Edges and features of the frame before, measured again now that its points are seen from both
+  // sides, at the beginning also of those before; for a rolling shutter only.
   std::vector<RelativeRotation> revised_edges;
-  std::optional<Features> revised_features;
+  std::vector<Features> revised_features;
   // Descriptors left out; for a rolling shutter, the keypoints that a global one would have seen.
   Features features;
   FrameReport report;
@@ -120,9 +121,9 @@ class RotationalOdometry {
  private:
   ImagePyramid BuildPyramidOf(const cv::Mat& image);
   Rotation PredictOrientation(double timestamp_s) const;
-  // Mean rotation rate since the frame before, in camera axes, rad/s. Drawing it out to the frame
-  // itself by the last change measured worse: accelerations of hand-held cameras do not last.
-  Eigen::Vector3d RotationRate(double timestamp_s, const Rotation& cam_from_world) const;
+  // Of a frame after all others, at the mean rate since the one before. Drawing that out to the
+  // frame itself by the last change measured worse: accelerations of hand-held cameras do not last.
+  AngularMotion NewestMotion(double timestamp_s, const Rotation& cam_from_world) const;
   std::vector<OrientedView> RecentViews() const;
   TrackingResult Track(const std::vector<OrientedView>& views,
                        const TrackingTarget& target,
@@ -137,12 +138,15 @@ class RotationalOdometry {
                         const std::vector<OrientedView>& views) const;
   void CarryOn(const TrackingResult& tracked,
                const std::vector<OrientedView>& views,
-               const Eigen::Vector3d& rate,
-               Features& features) const;
-  void DetectNewFeatures(const cv::Mat& image, const Eigen::Vector3d& rate, View& view);
-  void ReviseNewestView(double timestamp_s,
-                        const Rotation& next_from_world,
-                        FrameEstimate& estimate);
+               View& view) const;
+  void DetectNewFeatures(const cv::Mat& image, View& view);
+  AngularMotion MotionOf(FrameId frame, int num_others) const;
+  // @param others  that are taken with it, before or after it.
+  void TakeOutShutterOf(View& view, const std::vector<const View*>& others) const;
+  // Of the present view, and once more of those before it, whose edges are measured again.
+  void TakeOutShutters(View& view, FrameEstimate& estimate);
+  // Older views that edges lead to, as far as they are remembered.
+  std::vector<const Features*> PartnersInGraph(FrameId frame) const;
   void Connect(const View& view, FrameEstimate& estimate);
   std::vector<const Features*> Partners(const View& view) const;
   std::vector<Connection> MeasureEdges(const Features& view,

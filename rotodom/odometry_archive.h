@@ -59,10 +59,11 @@ void TransferValue(Archive& archive, Features& features) {
          rgb,
          covariances_px,
          tracks,
+         shared_error_px,
          angles_rad,
          descriptors] = features;
   archive(frame, keypoints_px, bearings, levels, rgb, covariances_px, tracks, angles_rad);
-  archive(descriptors);
+  archive(shared_error_px, descriptors);
 }
 
 template <class Archive>

@@ -146,7 +146,7 @@ class Completion {
     // The pixel decides on the pose, which decides on the pixel.
     for (int k = 0; k < 2; ++k) {
       const double late_s = camera_.ExposureTime(place.image_px);
-      place.cam_from_world = Rotation::Exp(late_s * view.view->rate) * view.cam_from_world;
+      place.cam_from_world = view.view->motion.After(late_s) * view.cam_from_world;
       place.in_cam = place.cam_from_world *
                      Eigen::Vector3d(point - view.center_in_world - late_s * view.view->velocity);
       const auto late_px = camera_.Project(place.in_cam);

@@ -9,6 +9,7 @@
 #include <opencv2/core.hpp>
 
 #include "rotodom/camera/camera.h"
+#include "rotodom/tracking/shutter.h"
 #include "rotodom/types/reconstruction.h"
 
 namespace rotslam {
@@ -49,9 +50,9 @@ struct CompletionOptions {
 struct MapView {
   cv::Mat image;  // 8-bit grey
   cv::Mat half;   // the same at half the size
-  // With a rolling shutter, how the camera moved: rotation in rad/s in camera axes, and its centre
-  // in world units per second.
-  Eigen::Vector3d rate = Eigen::Vector3d::Zero();
+  // With a rolling shutter, how the camera moved: how it turned, and its centre in world units per
+  // second.
+  AngularMotion motion;
   Eigen::Vector3d velocity = Eigen::Vector3d::Zero();
 };
 using MapViews = std::map<FrameId, MapView>;

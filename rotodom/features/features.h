@@ -67,6 +67,9 @@ struct Features {
   std::vector<Eigen::Matrix2f> covariances_px;
   // By the tracker: the scene point that each one shows, ascending.
   std::vector<TrackId> tracks;
+  // By the tracker: standard deviation of errors that neighbouring keypoints share, such as what is
+  // not known of the motion that a rolling shutter sees.
+  double shared_error_px = 0.0;
   // By DescribeFeatures.
   std::vector<float> angles_rad;  // direction of the intensity centroid
   cv::Mat descriptors;            // n x 32 bytes, ORB

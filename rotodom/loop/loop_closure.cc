@@ -210,17 +210,17 @@ bool LoopClosure::TakeOutShutter(const RotationMap& cam_from_world, Features& co
   if (camera_.readout_s == 0.0) return true;
   const auto here = cam_from_world.find(corners.frame);
   if (here == cam_from_world.begin() || std::next(here) == cam_from_world.end()) return false;
-  const auto rate_between = [&](const auto& from, const auto& to) -> Eigen::Vector3d {
-    return (to->second * from->second.Inverse()).Log() /
-           (timestamps_s_.at(to->first) - timestamps_s_.at(from->first));
+  // What one orientation more would make of the motion tells what this one may have wrong.
+  constexpr int kOrientations = 2;
+  const auto motion = [&](int num_others) {
+    const auto time_s = [&](FrameId frame) { return timestamps_s_.at(frame); };
+    return MotionAt(corners.frame, cam_from_world, time_s, num_others);
   };
-  const Eigen::Vector3d rate = rate_between(std::prev(here), std::next(here));
-  const Eigen::Vector3d change =
-      rate_between(here, std::next(here)) - rate_between(std::prev(here), here);
-  // The rate in mid-frame is known to half its change, the first row is half a readout away.
-  const double error_deg = 0.25 * camera_.readout_s * change.norm() * kDegFromRad;
-  if (error_deg > options_.max_shutter_error_deg) return false;
-  MoveToMidFrame(camera_, rate, corners);
+  const AngularMotion believed = motion(kOrientations);
+  const double error_rad =
+      LargestDifference(believed, motion(kOrientations + 1), camera_.readout_s);
+  if (error_rad * kDegFromRad > options_.max_shutter_error_deg) return false;
+  MoveToMidFrame(camera_, believed, corners);
   return true;
 }
 

@@ -12,7 +12,7 @@ namespace {
 // The search for loops asks for the features of places only.
 void DropWhatTracksNeed(FrameRecord& record) {
   if (!record.corners) record.estimate.features = {};
-  record.estimate.revised_features.reset();
+  record.estimate.revised_features.clear();
   for (auto* connections :
        {&record.estimate.connections, &record.loops.connections, &record.loops.waiting}) {
     for (Connection& connection : *connections) connection.matches.pairs.clear();

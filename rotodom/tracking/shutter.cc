@@ -1,27 +1,126 @@
 #include "rotodom/tracking/shutter.h"
 
+#include <algorithm>
+#include <cmath>
+#include <iterator>
+#include <stdexcept>
+#include <vector>
+
+#include <Eigen/LU>
+
 #include "rotodom/types/rotation.h"
 
 namespace rotslam {
 
-std::optional<Eigen::Vector3d> BearingInMidFrame(const Eigen::Vector2d& keypoint_px,
-                                                 const Camera& camera,
-                                                 const Eigen::Vector3d& rate,
-                                                 const Eigen::Vector2d& flow_px_per_s) {
-  if (camera.readout_s == 0.0) return camera.Unproject(keypoint_px);
-  const double late_s = camera.ExposureTime(keypoint_px);
-  const auto bearing = camera.Unproject(keypoint_px - late_s * flow_px_per_s);
-  if (!bearing) return std::nullopt;
-  return Rotation::Exp(-late_s * rate) * *bearing;
+PowerCoefficients PolynomialThrough(std::span<const TimedOffset> offsets) {
+  PowerCoefficients coefficients = PowerCoefficients::Zero();
+  const auto count = static_cast<int>(offsets.size());
+  if (count > coefficients.cols()) throw std::invalid_argument("PolynomialThrough: too many");
+  if (count == 0) return coefficients;
+  Eigen::Matrix4d powers = Eigen::Matrix4d::Identity();
+  Eigen::Matrix<double, 4, 3> rows = Eigen::Matrix<double, 4, 3>::Zero();
+  for (int k = 0; k < count; ++k) {
+    for (int power = 0; power < count; ++power) {
+      powers(k, power) = std::pow(offsets[k].after_s, power + 1);
+    }
+    rows.row(k) = offsets[k].offset.transpose();
+  }
+  coefficients = powers.partialPivLu().solve(rows).transpose();
+  return coefficients;
 }
 
-void MoveToMidFrame(const Camera& camera, const Eigen::Vector3d& rate, Features& corners) {
+Rotation AngularMotion::After(double seconds) const {
+  const double squared = seconds * seconds;
+  const Eigen::Vector4d powers(seconds, squared, squared * seconds, squared * squared);
+  return Rotation::Exp(coefficients * powers);
+}
+
+AngularMotion MotionThrough(const TimedOrientation& frame,
+                            std::span<const TimedOrientation> others) {
+  std::vector<TimedOffset> turns;
+  for (const TimedOrientation& other : others) {
+    const Rotation turn = other.cam_from_world * frame.cam_from_world.Inverse();
+    turns.push_back({other.time_s - frame.time_s, turn.Log()});
+  }
+  return {PolynomialThrough(turns)};
+}
+
+AngularMotion MotionAt(FrameId frame,
+                       const RotationMap& cam_from_world,
+                       const std::function<double(FrameId)>& time_s,
+                       int num_others) {
+  const auto here = cam_from_world.find(frame);
+  if (here == cam_from_world.end()) {
+    throw std::invalid_argument("MotionAt: a frame without orientation");
+  }
+  const auto timed = [&](RotationMap::const_iterator at) {
+    return TimedOrientation{time_s(at->first), at->second};
+  };
+  std::vector<TimedOrientation> others;
+  const auto has_room = [&] { return static_cast<int>(others.size()) < num_others; };
+  auto before = here;
+  auto behind = std::next(here);
+  while (has_room() && (before != cam_from_world.begin() || behind != cam_from_world.end())) {
+    if (behind != cam_from_world.end()) others.push_back(timed(behind++));
+    if (has_room() && before != cam_from_world.begin()) others.push_back(timed(--before));
+  }
+  return MotionThrough(timed(here), others);
+}
+
+double LargestDifference(const AngularMotion& a, const AngularMotion& b, double readout_s) {
+  double largest = 0.0;
+  for (const double late_s : {-0.5 * readout_s, 0.5 * readout_s}) {
+    largest = std::max(largest, (a.After(late_s) * b.After(late_s).Inverse()).Angle());
+  }
+  return largest;
+}
+
+Eigen::Vector3d BearingInMidFrame(const AngularMotion& motion, std::span<const TimedBearing> seen) {
+  // Lagrange's polynomial at time 0.
+  Eigen::Vector3d sum = Eigen::Vector3d::Zero();
+  for (const TimedBearing& one : seen) {
+    double weight = 1.0;
+    for (const TimedBearing& other : seen) {
+      if (&other != &one) weight *= other.after_s / (other.after_s - one.after_s);
+    }
+    sum += weight * (motion.After(one.after_s).Inverse() * one.bearing);
+  }
+  return sum.normalized();
+}
+
+void TakeOutShutter(const Camera& camera,
+                    const AngularMotion& motion,
+                    std::span<const View* const> others,
+                    View& view) {
+  std::vector<TimedBearing> seen;
+  const auto add = [&](const View& from, int index) {
+    const Eigen::Vector2d& keypoint_px = from.features.keypoints_px[index];
+    const auto bearing = camera.Unproject(keypoint_px);
+    const double frame_s = from.timestamp_s - view.timestamp_s;
+    if (bearing) seen.push_back({frame_s + camera.ExposureTime(keypoint_px), *bearing});
+  };
+  Features& features = view.features;
+  for (int n = 0; n < features.size(); ++n) {
+    seen.clear();
+    add(view, n);
+    if (seen.empty()) continue;
+    for (const View* other : others) {
+      const int index = FindTrack(other->features, features.tracks[n]);
+      if (index >= 0) add(*other, index);
+    }
+    features.bearings[n] = BearingInMidFrame(motion, seen);
+  }
+}
+
+void MoveToMidFrame(const Camera& camera, const AngularMotion& motion, Features& corners) {
   if (camera.readout_s == 0.0) return;
   for (int n = 0; n < corners.size(); ++n) {
-    const auto bearing = BearingInMidFrame(corners.keypoints_px[n], camera, rate);
+    const Eigen::Vector2d& keypoint_px = corners.keypoints_px[n];
+    const auto bearing = camera.Unproject(keypoint_px);
     if (!bearing) continue;
-    corners.bearings[n] = *bearing;
-    if (const auto moved = camera.Project(*bearing)) corners.keypoints_px[n] = *moved;
+    const TimedBearing seen{camera.ExposureTime(keypoint_px), *bearing};
+    corners.bearings[n] = BearingInMidFrame(motion, {&seen, 1});
+    if (const auto moved = camera.Project(corners.bearings[n])) corners.keypoints_px[n] = *moved;
   }
 }
 

@@ -63,13 +63,6 @@ std::vector<Candidate> FindCandidates(std::span<const OrientedView> views, int m
   return candidates;
 }
 
-// Position in `features` of `track`, -1 when the frame does not show it.
-int FindTrack(const Features& features, TrackId track) {
-  const auto found = std::lower_bound(features.tracks.begin(), features.tracks.end(), track);
-  if (found == features.tracks.end() || *found != track) return -1;
-  return static_cast<int>(found - features.tracks.begin());
-}
-
 struct Location {
   Eigen::Vector2d px;
   Eigen::Matrix2d covariance_px;
@@ -165,7 +158,7 @@ class Search {
     std::optional<Eigen::Vector2d> px = camera_.Project(bearing);
     if (!px || camera_.readout_s == 0.0) return px;
     const double late_s = camera_.ExposureTime(shown_px.value_or(*px));
-    return camera_.Project(Rotation::Exp(late_s * target_.rate) * bearing);
+    return camera_.Project(target_.motion.After(late_s) * bearing);
   }
 
   // What is left of the flow when the turn is taken out bends the patch, too.

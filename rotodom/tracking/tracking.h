@@ -10,6 +10,7 @@
 #include "rotodom/camera/camera.h"
 #include "rotodom/relative_rotation/bearing_pair.h"
 #include "rotodom/tracking/flow_field.h"
+#include "rotodom/tracking/shutter.h"
 #include "rotodom/tracking/view.h"
 
 namespace rotslam {
@@ -46,8 +47,8 @@ struct TrackingTarget {
   const ImagePyramid* pyramid = nullptr;
   double timestamp_s = 0.0;
   Rotation cam_from_world;
-  // The rotation rate at the target, rad/s in camera axes, for a rolling shutter.
-  Eigen::Vector3d rate = Eigen::Vector3d::Zero();
+  // Of the camera at the target, for a rolling shutter.
+  AngularMotion motion;
   // When given, the motion beside the rotation; otherwise each point goes on with its own.
   const FlowField* flow = nullptr;
   // Points beyond this number that are not in the newest view are not looked for.

@@ -1,5 +1,7 @@
 #include "rotodom/tracking/view.h"
 
+#include <algorithm>
+
 namespace rotslam {
 
 int CountCommonTracks(const Features& a, const Features& b) {
@@ -18,6 +20,12 @@ int CountCommonTracks(const std::vector<TrackId>& a, const std::vector<TrackId>&
     j += j_first;
   }
   return count;
+}
+
+int FindTrack(const Features& features, TrackId track) {
+  const auto found = std::lower_bound(features.tracks.begin(), features.tracks.end(), track);
+  if (found == features.tracks.end() || *found != track) return -1;
+  return static_cast<int>(found - features.tracks.begin());
 }
 
 }  // namespace rotslam

@@ -31,4 +31,7 @@ int CountCommonTracks(const std::vector<TrackId>& a, const std::vector<TrackId>&
 /// The same of their `tracks`.
 int CountCommonTracks(const Features& a, const Features& b);
 
+/// Position in `features` of `track`, -1 when the frame does not show it.
+int FindTrack(const Features& features, TrackId track);
+
 }  // namespace rotslam

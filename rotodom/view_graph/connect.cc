@@ -90,12 +90,15 @@ ConnectionHypotheses HypothesesByMatches(const Features& view_i,
   const FrameId j = view_j.frame;
   const std::uint64_t seed = options.seed * 0x9E3779B97F4A7C15ULL +
                              (std::uint64_t(i.value) << 32 | std::uint32_t(j.value));
+  RelativeRotationOptions pair_options = options.relative_rotation;
+  pair_options.shared_error_px =
+      std::hypot(pair_options.shared_error_px, view_i.shared_error_px, view_j.shared_error_px);
   ConnectionHypotheses hypotheses;
   for (const RelativeRotationEstimate& estimate :
        EstimateRotationHypotheses(pairs,
                                   predicted_j_from_i,
                                   focal_px,
-                                  options.relative_rotation,
+                                  pair_options,
                                   seed,
                                   CovariancesOf(view_i, view_j, keypoints))) {
     hypotheses.connections.push_back(ConnectionOf(estimate, i, j, keypoints));

@@ -83,11 +83,11 @@ struct Walk {
       map.center_in_world[frame] = {kSpacing * k - 1.0, 0.03 * k, 0.02 * k};
       MapView motion;
       if (readout_s > 0.0) {
-        motion.rate = {0.2, -0.4, 0.3};
+        motion.motion.coefficients.col(0) << 0.2, -0.4, 0.3;
         motion.velocity = {0.8, 0.2, 0.1};
       }
       views[frame] = MakeMapView(ImageOf(frame, motion));
-      views[frame].rate = motion.rate;
+      views[frame].motion = motion.motion;
       views[frame].velocity = motion.velocity;
     }
     // Points that the middle view shows.
@@ -114,7 +114,7 @@ struct Walk {
         const Eigen::Vector2d px(column, row);
         const double late_s = camera.ExposureTime(px);
         const Rotation world_from_cam =
-            (Rotation::Exp(late_s * motion.rate) * map.cam_from_world.at(frame)).Inverse();
+            (motion.motion.After(late_s) * map.cam_from_world.at(frame)).Inverse();
         const Eigen::Vector3d center = map.center_in_world.at(frame) + late_s * motion.velocity;
         const Eigen::Vector3d ray = world_from_cam * *camera.Unproject(px);
         const Eigen::Vector3d on_wall = center + ray * ((kWallDepth - center.z()) / ray.z());
@@ -244,7 +244,10 @@ TEST_P(ThroughAShutter, FindsThem) {
   walk.See(3, 5);
   ExpectFindsNearlyAll(walk, 0.07);
   // Without the motion, rows at the border are out by pixels.
-  for (auto& [frame, view] : walk.views) view.rate = view.velocity = Eigen::Vector3d::Zero();
+  for (auto& [frame, view] : walk.views) {
+    view.motion = {};
+    view.velocity.setZero();
+  }
   EXPECT_GT(Quantile(ErrorsPx(walk, walk.Complete()), 0.5), 0.3);
 }
 
