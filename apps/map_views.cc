@@ -1,6 +1,7 @@
 #include "apps/map_views.h"
 
 #include <algorithm>
+#include <array>
 #include <exception>
 #include <iterator>
 #include <memory>
@@ -10,6 +11,17 @@
 #include "apps/placement.h"
 
 namespace rotslam {
+namespace {
+
+// The frames next to one: before and behind, or the next two where there is none on one side.
+std::array<FrameId, 2> NextTo(FrameId frame, const RotationMap& cam_from_world) {
+  const int value = frame.value;
+  if (!cam_from_world.contains(FrameId{value - 1})) return {FrameId{value + 1}, FrameId{value + 2}};
+  if (!cam_from_world.contains(FrameId{value + 1})) return {FrameId{value - 1}, FrameId{value - 2}};
+  return {FrameId{value - 1}, FrameId{value + 1}};
+}
+
+}  // namespace
 
 MapViews ReadMapViews(const std::string& path,
                       const SequenceOptions& options,
@@ -49,7 +61,7 @@ void SetMotions(const MotionSources& sources, const Reconstruction& map, MapView
     view.motion = MotionAt(frame, cam_from_world, time_s, kOrientations);
     const auto center = map.center_in_world.find(frame);
     if (center == map.center_in_world.end()) continue;
-    for (const FrameId next : {FrameId{frame.value - 1}, FrameId{frame.value + 1}}) {
+    for (const FrameId next : NextTo(frame, cam_from_world)) {
       const auto rotation = cam_from_world.find(next);
       if (rotation == cam_from_world.end()) continue;
       ResectionStart& start = starts[next];
@@ -67,12 +79,17 @@ void SetMotions(const MotionSources& sources, const Reconstruction& map, MapView
   for (auto& [frame, view] : views) {
     const auto center = map.center_in_world.find(frame);
     if (center == map.center_in_world.end()) continue;
+    const TimedOrientation here{time_s(frame), map.cam_from_world.at(frame)};
+    std::vector<TimedOrientation> others;
     std::vector<TimedOffset> ways;
-    for (const FrameId next : {FrameId{frame.value - 1}, FrameId{frame.value + 1}}) {
+    for (const FrameId next : NextTo(frame, cam_from_world)) {
       const auto pose = poses.find(next);
       if (pose == poses.end()) continue;
-      ways.push_back({time_s(next) - time_s(frame), pose->second.center_in_world - center->second});
+      others.push_back({time_s(next), pose->second.cam_from_world});
+      ways.push_back({time_s(next) - here.time_s, pose->second.center_in_world - center->second});
     }
+    // A map may have mended an orientation.
+    if (others.size() == 2) view.motion = MotionThrough(here, others);
     view.velocity = PolynomialThrough(ways).col(0);
   }
 }

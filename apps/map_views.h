@@ -30,8 +30,9 @@ struct MotionSources {
   int num_threads = 1;
 };
 
-/// Gives the views the motion that a rolling shutter sees: the turn through the frames before and
-/// behind each, and the velocity through where these stand by the map's points.
+/// Gives the views the motion that a rolling shutter sees: the turn and the velocity through the
+/// frames before and behind each, which are placed by the map's points. Where they cannot be, the
+/// turn is the odometry's and the velocity 0. Nothing happens with a global shutter.
 void SetMotions(const MotionSources& sources, const Reconstruction& map, MapViews& views);
 
 /// Described corners of the views, where a global shutter would see them.

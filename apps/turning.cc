@@ -273,7 +273,11 @@ std::optional<TurningResult> FindTurning(const Camera& camera,
     if (!is_believable(sampled, kSampleShare * share)) return std::nullopt;
   }
   TurningResult turning = RefineTurning(camera, cam_from_world, tracks, options);
-  if (!turning.lens_refined || !is_believable(turning, 1.0)) return std::nullopt;
+  // Through the lens they were asked through pairs of views know better, but where nothing came of
+  // what they say.
+  const bool has_map = moving.num_observations > 0;
+  if (has_map && !turning.lens_refined) return std::nullopt;
+  if (!is_believable(turning, 1.0)) return std::nullopt;
   return turning;
 }
 

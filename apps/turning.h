@@ -37,11 +37,12 @@ double Evidence(const Explanation& explanation, double limit);
 /// Rotations and a lens that explain a sequence better than a moving camera does. A calibration
 /// that is off by some percent makes wide turns in place look like movement, and no pair of frames
 /// can tell the two apart; all together can. Rotations alone are believed where another lens makes
-/// them fit and there is more evidence of them than of positions and points, and they pass at least
-/// a quarter of all checks. Where positions and points leave a third of the observations out, small
-/// residuals of the rest only say that these were picked: then all checks count alike. A lens twice
-/// as long or more is not believed: a wall that a camera passes looks like a turn with a lens six
-/// times as long.
+/// them fit, or where there are no positions at all: blur, noise and images that hardly turn make
+/// some pairs look like movement, too. There must be more evidence of them than of positions and
+/// points, and they must pass at least a quarter of all checks. Where positions and points leave a
+/// third of the observations out, small residuals of the rest only say that these were picked: then
+/// all checks count alike. A lens twice as long or more is not believed: a wall that a camera
+/// passes looks like a turn with a lens six times as long.
 /// @param moving  positions and points; empty where there are none.
 /// Cost:  next to nothing where the camera does move: a sample of the tracks tells first.
 std::optional<TurningResult> FindTurning(const Camera& camera,

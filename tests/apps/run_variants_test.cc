@@ -84,6 +84,12 @@ TEST_F(RunVariants, EquidistantCamera) {
   ExpectGood(sequence, Run(sequence, "out", {"--camera", camera}));
 }
 
+TEST_F(RunVariants, RollingShutter) {
+  const fs::path sequence =
+      Simulate({"--readout=0.025", "--speed-scale=2", "--width=320", "--height=240"});
+  ExpectGood(sequence, Run(sequence, "out"));
+}
+
 TEST_F(RunVariants, SameBytesEveryTimeAndAtAnyNumberOfThreads) {
   for (const std::string kind : {"gimbal", "handheld"}) {
     SCOPED_TRACE(kind);

@@ -93,8 +93,19 @@ TEST(FindTurning, NeverBelievesThatAWallThatPassesIsATurn) {
 
 TEST(FindTurning, LeavesAGoodCalibrationToTheTestOfPairs) {
   const BaScene scene = MakeScene(true);
-  EXPECT_FALSE(FindTurning(scene.camera, scene.truth.cam_from_world, scene.truth.tracks, {}, {})
-                   .has_value());
+  const Explanation poor_map{.num_observations = 500, .num_tracks = 100, .redundancy = 300};
+  EXPECT_FALSE(
+      FindTurning(scene.camera, scene.truth.cam_from_world, scene.truth.tracks, poor_map, {})
+          .has_value());
+}
+
+TEST(FindTurning, BelievesInATurnWhereThereIsNoMap) {
+  const BaScene scene = MakeScene(true);
+  const auto turning =
+      FindTurning(scene.camera, scene.truth.cam_from_world, scene.truth.tracks, {}, {});
+  ASSERT_TRUE(turning.has_value());
+  EXPECT_FALSE(turning->lens_refined);
+  EXPECT_EQ(turning->camera, scene.camera);
 }
 
 TEST(FindTurning, NeverBelievesThatAStreetIsATurn) {
