@@ -25,8 +25,9 @@ struct LoopOptions {
   // A frame that shares less than this part of its points with the last place is the next one.
   // More places find more loops and take more time and memory.
   double place_overlap = 0.5;
-  // With a rolling shutter, a frame during which the rotation's rate changes is distorted in a way
-  // that is not known; beyond this, at the image's border, a steadier one becomes the place.
+  // With a rolling shutter, a frame during which the rotation's acceleration changes is distorted
+  // in a way that is not known; beyond this, at the image's border, a steadier one becomes the
+  // place.
   double max_shutter_error_deg = 0.1;
   // A loop that turns the present orientation by less than this waits for the next one, or for the
   // end, before all orientations are averaged.

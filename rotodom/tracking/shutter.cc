@@ -92,12 +92,17 @@ void TakeOutShutter(const Camera& camera,
                     const AngularMotion& motion,
                     std::span<const View* const> others,
                     View& view) {
+  // Of what is closer in time the noise tells more than the motion.
+  const double least_distance_s = 0.5 * camera.readout_s;
   std::vector<TimedBearing> seen;
   const auto add = [&](const View& from, int index) {
     const Eigen::Vector2d& keypoint_px = from.features.keypoints_px[index];
     const auto bearing = camera.Unproject(keypoint_px);
-    const double frame_s = from.timestamp_s - view.timestamp_s;
-    if (bearing) seen.push_back({frame_s + camera.ExposureTime(keypoint_px), *bearing});
+    const double after_s = from.timestamp_s - view.timestamp_s + camera.ExposureTime(keypoint_px);
+    const bool is_apart = std::all_of(seen.begin(), seen.end(), [&](const TimedBearing& other) {
+      return std::abs(after_s - other.after_s) > least_distance_s;
+    });
+    if (bearing && is_apart) seen.push_back({after_s, *bearing});
   };
   Features& features = view.features;
   for (int n = 0; n < features.size(); ++n) {

@@ -75,7 +75,8 @@ Eigen::Vector3d BearingInMidFrame(const AngularMotion& motion, std::span<const T
 
 /// Sets the bearings of a view to what they would be had all its rows been exposed in the middle of
 /// the frame; its keypoints stay where they are. Those without a bearing keep the one they have.
-/// @param others  that may show the same points; of the same camera, at other times.
+/// @param others  that may show the same points; of the same camera. What they saw within half a
+///                readout of the view, or of each other, does not count.
 void TakeOutShutter(const Camera& camera,
                     const AngularMotion& motion,
                     std::span<const View* const> others,

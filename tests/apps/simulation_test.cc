@@ -684,6 +684,15 @@ TEST(WriteSequence, EurocFilesAreTheSameAtAnyNumberOfThreads) {
   EXPECT_EQ(ReadCamera(folder.Path() / "a/mav0/cam0/sensor.yaml"), simulation.GetCamera());
 }
 
+TEST(WriteSequence, RefusesALayoutThatCannotTellOfARollingShutter) {
+  SimulationOptions options = Small(SimulationKind::kHandheld);
+  options.camera.readout_s = 0.02;
+  const Folder folder;
+  WriteOptions write;
+  write.layout = SequenceLayout::kEuroc;
+  EXPECT_THROW(WriteSequence(Simulation(options), folder.Path(), write), std::invalid_argument);
+}
+
 TEST(WriteSequence, SaysWhereItCannotWrite) {
   const Folder folder;
   std::ofstream(folder.Path() / "file") << "in the way";

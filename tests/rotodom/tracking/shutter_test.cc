@@ -96,6 +96,31 @@ TEST(BearingInMidFrame, NeedsNoExactMotionWhereThePointIsSeenAround) {
   EXPECT_LT(error_rad(right, {0.012}), alone);
 }
 
+TEST(TakeOutShutter, LeavesOutWhatIsSeenAtNearlyTheSameTime) {
+  Camera camera = BaCamera();
+  camera.readout_s = 0.03;
+  const AngularMotion motion = Steady({0.0, 0.4, 0.0});
+  const auto view_at = [](double time_s, const Eigen::Vector2d& keypoint_px) {
+    View view;
+    view.timestamp_s = time_s;
+    view.features.keypoints_px = {keypoint_px};
+    view.features.bearings = {Eigen::Vector3d::UnitZ()};
+    view.features.tracks = {TrackId{7}};
+    return view;
+  };
+  const auto bearing_with = [&](const View& other) {
+    View view = view_at(0.0, {150.0, 40.0});
+    const View* others[] = {&other};
+    TakeOutShutter(camera, motion, others, view);
+    return view.features.bearings[0];
+  };
+  View alone = view_at(0.0, {150.0, 40.0});
+  TakeOutShutter(camera, motion, {}, alone);
+  // The same pixel a thousandth of a second later, a match that is off by a pixel.
+  EXPECT_EQ(bearing_with(view_at(0.001, {151.0, 40.0})), alone.features.bearings[0]);
+  EXPECT_NE(bearing_with(view_at(0.033, {151.0, 40.0})), alone.features.bearings[0]);
+}
+
 class MoveToMidFrameTest : public testing::TestWithParam<ReadoutStart> {};
 INSTANTIATE_TEST_SUITE_P(ReadoutStarts,
                          MoveToMidFrameTest,
