@@ -291,7 +291,7 @@ void RotationalOdometry::TakeOutShutterOf(View& view,
                                           const std::vector<const View*>& others) const {
   // What one orientation more would make of the motion tells what this one has wrong; half of it,
   // for most rows are nearer to the middle. Going through that one, too, measured worse where
-  // tracking is noisy (7-Scenes kitchen, RPE_1 0.231 instead of 0.207 deg).
+  // tracking is noisy (7-Scenes kitchen, RPE_1 0.231 instead of 0.206 deg).
   constexpr int kOrientations = 2;
   constexpr double kShareUnknown = 0.5;
   const AngularMotion motion = MotionOf(view.features.frame, kOrientations);
