@@ -1,9 +1,7 @@
 #include "apps/map_views.h"
 
-#include <algorithm>
 #include <array>
 #include <exception>
-#include <iterator>
 #include <memory>
 #include <optional>
 #include <vector>
