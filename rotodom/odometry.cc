@@ -166,11 +166,6 @@ AngularMotion RotationalOdometry::NewestMotion(double timestamp_s,
   return MotionThrough({timestamp_s, cam_from_world}, {&before, 1});
 }
 
-AngularMotion RotationalOdometry::MotionOf(FrameId frame, int num_others) const {
-  const auto time_s = [&](FrameId at) { return timestamps_s_.at(at); };
-  return MotionAt(frame, cam_from_world_, time_s, num_others);
-}
-
 std::vector<OrientedView> RotationalOdometry::RecentViews() const {
   std::vector<OrientedView> views;
   for (const std::shared_ptr<View>& view : recent_) {
@@ -289,15 +284,12 @@ void RotationalOdometry::DetectNewFeatures(const cv::Mat& image, View& view) {
 
 void RotationalOdometry::TakeOutShutterOf(View& view,
                                           const std::vector<const View*>& others) const {
-  // What one orientation more would make of the motion tells what this one has wrong; half of it,
-  // for most rows are nearer to the middle. Going through that one, too, measured worse where
-  // tracking is noisy (7-Scenes kitchen, RPE_1 0.231 instead of 0.206 deg).
-  constexpr int kOrientations = 2;
-  constexpr double kShareUnknown = 0.5;
-  const AngularMotion motion = MotionOf(view.features.frame, kOrientations);
-  const AngularMotion finer = MotionOf(view.features.frame, kOrientations + 1);
-  const double difference = LargestDifference(motion, finer, camera_.readout_s);
-  view.features.shared_error_px = kShareUnknown * difference * camera_.MeanFocal();
+  // Most rows are nearer to the middle than the ones that may be off by that error.
+  constexpr double kShareOfError = 0.5;
+  const auto time_s = [&](FrameId frame) { return timestamps_s_.at(frame); };
+  const auto [motion, error_rad] =
+      BelievedMotionAt(view.features.frame, cam_from_world_, time_s, camera_.readout_s);
+  view.features.shared_error_px = kShareOfError * error_rad * camera_.MeanFocal();
   TakeOutShutter(camera_, motion, others, view);
 }
 

@@ -140,7 +140,6 @@ class RotationalOdometry {
                const std::vector<OrientedView>& views,
                View& view) const;
   void DetectNewFeatures(const cv::Mat& image, View& view);
-  AngularMotion MotionOf(FrameId frame, int num_others) const;
   // @param others  that are taken with it, before or after it.
   void TakeOutShutterOf(View& view, const std::vector<const View*>& others) const;
   // Of the present view, and once more of those before it, whose edges are measured again.

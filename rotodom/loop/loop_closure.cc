@@ -210,17 +210,11 @@ bool LoopClosure::TakeOutShutter(const RotationMap& cam_from_world, Features& co
   if (camera_.readout_s == 0.0) return true;
   const auto here = cam_from_world.find(corners.frame);
   if (here == cam_from_world.begin() || std::next(here) == cam_from_world.end()) return false;
-  // What one orientation more would make of the motion tells what this one may have wrong.
-  constexpr int kOrientations = 2;
-  const auto motion = [&](int num_others) {
-    const auto time_s = [&](FrameId frame) { return timestamps_s_.at(frame); };
-    return MotionAt(corners.frame, cam_from_world, time_s, num_others);
-  };
-  const AngularMotion believed = motion(kOrientations);
-  const double error_rad =
-      LargestDifference(believed, motion(kOrientations + 1), camera_.readout_s);
+  const auto time_s = [&](FrameId frame) { return timestamps_s_.at(frame); };
+  const auto [motion, error_rad] =
+      BelievedMotionAt(corners.frame, cam_from_world, time_s, camera_.readout_s);
   if (error_rad * kDegFromRad > options_.max_shutter_error_deg) return false;
-  MoveToMidFrame(camera_, believed, corners);
+  MoveToMidFrame(camera_, motion, corners);
   return true;
 }
 

@@ -67,12 +67,18 @@ AngularMotion MotionAt(FrameId frame,
   return MotionThrough(timed(here), others);
 }
 
-double LargestDifference(const AngularMotion& a, const AngularMotion& b, double readout_s) {
-  double largest = 0.0;
+BelievedMotion BelievedMotionAt(FrameId frame,
+                                const RotationMap& cam_from_world,
+                                const std::function<double(FrameId)>& time_s,
+                                double readout_s) {
+  constexpr int kOthers = 2;
+  BelievedMotion believed{MotionAt(frame, cam_from_world, time_s, kOthers)};
+  const AngularMotion finer = MotionAt(frame, cam_from_world, time_s, kOthers + 1);
   for (const double late_s : {-0.5 * readout_s, 0.5 * readout_s}) {
-    largest = std::max(largest, (a.After(late_s) * b.After(late_s).Inverse()).Angle());
+    const Rotation between = believed.motion.After(late_s) * finer.After(late_s).Inverse();
+    believed.error_rad = std::max(believed.error_rad, between.Angle());
   }
-  return largest;
+  return believed;
 }
 
 Eigen::Vector3d BearingInMidFrame(const AngularMotion& motion, std::span<const TimedBearing> seen) {

@@ -55,8 +55,19 @@ AngularMotion MotionAt(FrameId frame,
                        const std::function<double(FrameId)>& time_s,
                        int num_others);
 
-/// How far two motions are apart, at most, while the rows of a frame are exposed, radians.
-double LargestDifference(const AngularMotion& a, const AngularMotion& b, double readout_s);
+/// A motion, and how far it may be off while the rows of a frame are exposed, radians.
+struct BelievedMotion {
+  AngularMotion motion;
+  double error_rad = 0.0;
+};
+
+/// MotionAt through two other frames; what a third would make of it tells the error. Going through
+/// that one, too, measured worse where tracking is noisy (7-Scenes kitchen, RPE_1 0.231 instead of
+/// 0.206 deg).
+BelievedMotion BelievedMotionAt(FrameId frame,
+                                const RotationMap& cam_from_world,
+                                const std::function<double(FrameId)>& time_s,
+                                double readout_s);
 
 /// A bearing in the camera as it stood then, seconds after the middle of a frame.
 struct TimedBearing {

@@ -72,6 +72,17 @@ TEST(MotionAt, IsBetterTheMoreFramesItGoesThrough) {
   EXPECT_THROW(LargestErrorRad(FrameId{9}, 2), std::invalid_argument);
 }
 
+TEST(BelievedMotionAt, TellsHowFarItIsOff) {
+  const auto time_s = [](FrameId at) { return at.value / 30.0; };
+  const RotationMap cam_from_world = SwayingFrames(9, 1.0 / 30.0);
+  for (const int frame : {0, 4, 8}) {
+    const BelievedMotion believed = BelievedMotionAt(FrameId{frame}, cam_from_world, time_s, 0.024);
+    const double error_rad = LargestErrorRad(FrameId{frame}, 2);
+    EXPECT_GT(believed.error_rad, 0.5 * error_rad) << frame;
+    EXPECT_LT(believed.error_rad, 2.0 * error_rad) << frame;
+  }
+}
+
 TEST(BearingInMidFrame, NeedsNoExactMotionWhereThePointIsSeenAround) {
   const Eigen::Vector3d point(0.3, -0.2, 1.0);
   const auto seen_at = [&](double after_s) {
