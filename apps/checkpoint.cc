@@ -23,7 +23,7 @@ namespace {
 namespace fs = std::filesystem;
 
 // Changes with what is written.
-constexpr std::string_view kMagic = "rotslam checkpoint 2\n";
+constexpr std::string_view kMagic = "rotslam checkpoint 3\n";
 
 std::string Hex(std::uint64_t number) {
   std::array<char, 17> text = {};
@@ -54,10 +54,9 @@ std::string Text(const OptionValue& value) {
 }
 
 std::string DescribeCamera(const Camera& camera) {
-  const auto& [model, width, height, fx, fy, cx, cy, distortion, readout_s, readout_from] = camera;
+  const auto& [model, width, height, fx, fy, cx, cy, distortion, readout_s, from, knows] = camera;
   return Describe(camera) + " (" +
-         ChecksumOf(model, width, height, fx, fy, cx, cy, distortion, readout_s, readout_from) +
-         ")";
+         ChecksumOf(model, width, height, fx, fy, cx, cy, distortion, readout_s, from, knows) + ")";
 }
 
 // Names, sizes and times of the images, in their order.
@@ -142,6 +141,7 @@ RunIdentity IdentityOf(const std::string& command,
   };
   add("sequence", options.sequence);
   add("rotodom", options.rotodom);
+  add("readout", options.readout);
   add("loop", options.loop);
   return identity;
 }
@@ -188,7 +188,7 @@ void Checkpoint::Open(const RunIdentity& identity) {
   try {
     ArchiveReader archive(body);
     archive(identity_then, committed_.num_records, committed_.num_bytes, committed_.checksum);
-    archive(state_);
+    archive(state_, readout_);
     archive.ExpectEnd();
   } catch (const std::runtime_error& error) {
     Refuse(file.string() + ": " + error.what());
@@ -241,6 +241,14 @@ void Checkpoint::Restore(LoopedOdometry& odometry) const {
   }
 }
 
+void Checkpoint::StartOver(const ReadoutEstimate& readout) {
+  reader_.reset();
+  Remove();
+  committed_ = {};
+  readout_ = readout;
+  if (every_ > 0) StartWriting();
+}
+
 void Checkpoint::StartWriting() {
   try {
     fs::create_directories(folder_);
@@ -272,7 +280,7 @@ void Checkpoint::Commit(std::string state) {
     writer_->Sync();
     JournalExtent extent = writer_->extent();
     ArchiveWriter body;
-    body(identity_, extent.num_records, extent.num_bytes, extent.checksum, state);
+    body(identity_, extent.num_records, extent.num_bytes, extent.checksum, state, readout_);
     const std::string bytes = body.TakeBytes();
     ArchiveWriter checksum;
     std::uint64_t sum = Checksum(bytes);

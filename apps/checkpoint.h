@@ -40,10 +40,11 @@ RunIdentity IdentityOf(const std::string& command,
 struct RecordedFrame {
   Frame frame;
   FrameRecord record;
+  SeenPoints points;  // empty where nobody needs them any more
 
   template <class Archive>
   void Transfer(Archive& archive) {
-    archive(frame.id, frame.timestamp_s, frame.name, frame.problem, record);
+    archive(frame.id, frame.timestamp_s, frame.name, frame.problem, record, points);
   }
 };
 
@@ -72,6 +73,11 @@ class Checkpoint {
   /// Gives the odometry the state that it had after them.
   void Restore(LoopedOdometry& odometry) const;
 
+  /// What the frames have told of the camera's readout before they were read once more with it.
+  const std::optional<ReadoutEstimate>& readout() const { return readout_; }
+  /// Forgets all frames: they are read once more.
+  void StartOver(const ReadoutEstimate& readout);
+
   bool IsOn() const { return writer_ != nullptr; }
   void Append(RecordedFrame& frame);
   bool IsDue() const;
@@ -93,6 +99,7 @@ class Checkpoint {
   Progress& progress_;
   JournalExtent committed_;
   std::string state_;
+  std::optional<ReadoutEstimate> readout_;
   std::unique_ptr<JournalReader> reader_;  // null: nothing to read
   std::unique_ptr<JournalWriter> writer_;  // null: no checkpoints
 };

@@ -12,6 +12,7 @@
 
 #include "apps/orientations.h"
 #include "apps/positions.h"
+#include "apps/readout_watch.h"
 #include "rotodom/sequence/layout.h"
 
 namespace rotslam {
@@ -49,12 +50,13 @@ PipelineOptions FirstPass(PipelineOptions options) {
   return options;
 }
 
-// The focal length that the beginning of the sequence tells, from that of `input`'s camera.
+// The focal length that the beginning of the sequence tells, from that of `input`'s camera, which
+// also gets the readout, if it tells one.
 // @return  nullopt where it tells none.
 std::optional<double> FocalFrom(const InputFlags& flags,
                                 const CommonFlags& common,
                                 const PipelineOptions& options,
-                                const Input& input,
+                                Input& input,
                                 Interruption& interruption,
                                 Progress& progress) {
   Input part;
@@ -63,6 +65,7 @@ std::optional<double> FocalFrom(const InputFlags& flags,
   part.camera = input.camera;
   const Orientations orientations =
       FindOrientations(part, options, nullptr, true, common, interruption, progress);
+  if (part.readout) SetReadout(*part.readout, input);
   const char* const end = "interrupted while the focal length is sought: nothing is written yet";
   if (orientations.interrupted) throw InterruptedError(end);
   const LastWords last_words(interruption, [&] { progress.Warn(end); });
@@ -140,6 +143,7 @@ void RefineGuess(const InputFlags& flags,
     if (focal_px) {
       guess.focal_px = *focal_px;
       input.camera = CameraOf(guess, input.sequence->image_size());
+      if (input.readout) SetReadout(ReadoutEstimate(*input.readout), input);
     }
     if (std::abs(guess.focal_px - before_px) <= kFirstPassTolerance * before_px) break;
   }

@@ -10,11 +10,12 @@ FrameStream::FrameStream(Sequence& sequence, LoopedOdometry& odometry, Checkpoin
       checkpoint_(checkpoint),
       is_replaying_(checkpoint != nullptr) {}
 
-std::optional<FrameStream::Step> FrameStream::Next() {
+std::optional<FrameStream::Step> FrameStream::Next(bool needs_points) {
   if (is_replaying_) {
     if (std::optional<RecordedFrame> recorded = checkpoint_->NextRecorded()) {
       ++num_recorded_;
       LoopedEstimate estimate = odometry_.Replay(std::move(recorded->record));
+      estimate.points = std::move(recorded->points);
       return Step{std::move(recorded->frame), std::move(estimate)};
     }
     is_replaying_ = false;
@@ -34,6 +35,7 @@ std::optional<FrameStream::Step> FrameStream::Next() {
   step.frame = *std::move(frame);
   if (!records) return step;
   recorded.frame = step.frame;
+  if (needs_points) recorded.points = step.estimate.points;
   checkpoint_->Append(recorded);
   if (checkpoint_->IsDue()) Commit();
   return step;

@@ -20,7 +20,8 @@ class FrameStream {
     LoopedEstimate estimate;
   };
   /// The next frame; nullopt after the last.
-  std::optional<Step> Next();
+  /// @param needs_points  of its estimate; else they may be missing.
+  std::optional<Step> Next(bool needs_points);
 
   /// Keeps all frames so far. To be called after the last one, too.
   void Commit();

@@ -10,6 +10,7 @@
 #include "rotodom/camera/camera.h"
 #include "rotodom/loop/loop_closure.h"
 #include "rotodom/sequence/sequence.h"
+#include "rotodom/tracking/readout.h"
 
 namespace rotslam {
 
@@ -47,6 +48,8 @@ struct Input {
   Camera camera;  // with the size of the images
   std::string camera_file;
   std::optional<FocalGuess> guess;  // set: there is no camera_file
+  // How its sensor is read out, where the images tell it instead of the calibration.
+  std::optional<ReadoutEstimate> readout;
   // Orientations from elsewhere, and their file.
   std::optional<std::vector<StampedRotation>> given_rotations;
   std::string rotations_file;

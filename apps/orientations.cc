@@ -11,6 +11,7 @@
 #include <utility>
 
 #include "apps/frame_stream.h"
+#include "apps/readout_watch.h"
 #include "rotodom/types/disjoint_sets.h"
 #include "rotodom/types/median.h"
 
@@ -179,20 +180,35 @@ Orientations FindOrientations(Input& input,
                               const Interruption& interruption,
                               Progress& progress,
                               Checkpoint* checkpoint) {
+  if (checkpoint != nullptr && checkpoint->readout()) SetReadout(*checkpoint->readout(), input);
   LoopedOdometry odometry(input.camera,
                           options.rotodom,
                           options.loop,
-                          std::move(vocabulary),
+                          vocabulary,
                           keep_features,
                           flags.seed,
                           flags.NumThreads());
+  ReadoutWatch watch(input.camera, options, flags.NumThreads());
   Orientations orientations;
   LiveCounters counters(options.held_stretches);
   FrameStream frames(*input.sequence, odometry, checkpoint);
   const int num_announced = input.sequence->NumFrames();
+  const auto start_over = [&] {
+    const ReadoutEstimate& readout = *watch.found();
+    progress.EndStage("the shutter rolls, read out in " + DescribeReadout(readout));
+    progress.Warn(
+        "the camera file does not say how the sensor is read out, the images do: starts " +
+        std::string("again from the first frame with ") + CameraLines(readout) +
+        "; in the camera file that spares the second reading");
+    if (checkpoint != nullptr) checkpoint->StartOver(readout);
+    SetReadout(readout, input);
+    input.sequence = OpenSequence(input.path, options.sequence);
+    return FindOrientations(
+        input, options, vocabulary, keep_features, flags, interruption, progress, checkpoint);
+  };
   progress.StartStage("orientations", num_announced);
-  while (const std::optional<FrameStream::Step> step = frames.Next()) {
-    const auto& [frame, estimate] = *step;
+  while (std::optional<FrameStream::Step> step = frames.Next(watch.IsOn())) {
+    auto& [frame, estimate] = *step;
     if (!frame.problem.empty()) {
       progress.Warn("frame " + std::to_string(frame.id.value) +
                     " skipped, its pose is interpolated: " + frame.problem);
@@ -204,6 +220,8 @@ Orientations FindOrientations(Input& input,
     orientations.reports.push_back(estimate.report);
     TellDetails(estimate, progress);
     progress.Step(frame.id.value + 1, counters.Update(estimate, odometry.result()));
+    watch.Add(frame.id, std::move(estimate.points), odometry.result());
+    if (watch.found()) return start_over();
     orientations.loops.insert(
         orientations.loops.end(), estimate.loops.begin(), estimate.loops.end());
     orientations.interrupted = interruption.IsRequested();
@@ -212,6 +230,8 @@ Orientations FindOrientations(Input& input,
       break;
     }
   }
+  if (!orientations.interrupted) watch.Finish(odometry.result());
+  if (watch.found()) return start_over();
   const std::vector<LoopCheck> last_loops = odometry.Finish();
   orientations.loops.insert(orientations.loops.end(), last_loops.begin(), last_loops.end());
   orientations.num_places = odometry.num_places();

@@ -6,9 +6,16 @@
 #include "rotodom/types/options.h"
 
 namespace rotslam {
+
+std::optional<std::string> ReadoutOptions::Problem() const {
+  if (max_frames < 0) return OutOfRange("max_frames", max_frames, "zero or more");
+  return std::nullopt;
+}
+
 std::optional<std::string> PipelineOptions::Problem() const {
   if (auto problem = ProblemIn("sequence", sequence)) return problem;
   if (auto problem = ProblemIn("rotodom", rotodom)) return problem;
+  if (auto problem = ProblemIn("readout", readout)) return problem;
   if (auto problem = ProblemIn("loop", loop)) return problem;
   if (auto problem = ProblemIn("held_stretches", held_stretches)) return problem;
   if (auto problem = ProblemIn("keyframes", keyframes)) return problem;

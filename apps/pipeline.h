@@ -19,10 +19,28 @@
 
 namespace rotslam {
 
+/// Of cameras whose file does not say how the sensor is read out.
+struct ReadoutOptions {
+  // Off: they have a global shutter.
+  bool enabled = true;
+  // Nobody asks after so many frames. More would find shutters of cameras that stand for the first
+  // half minute, and have to read that half minute again.
+  int max_frames = 1000;
+
+  std::optional<std::string> Problem() const;
+
+  template <class Visitor>
+  void Visit(Visitor&& visit) {
+    visit("enabled", enabled);
+    visit("max_frames", max_frames);
+  }
+};
+
 /// All that `rotslam run` can be told, stage by stage. The defaults run a real sequence untouched.
 struct PipelineOptions {
   SequenceOptions sequence;
   OdometryOptions rotodom;
+  ReadoutOptions readout;
   LoopOptions loop;
   HeldStretchOptions held_stretches;
   KeyframeOptions keyframes;
@@ -41,6 +59,7 @@ struct PipelineOptions {
   void Visit(Visitor&& visit) {
     visit("sequence", sequence);
     visit("rotodom", rotodom);
+    visit("readout", readout);
     visit("loop", loop);
     visit("held_stretches", held_stretches);
     visit("keyframes", keyframes);

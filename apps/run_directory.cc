@@ -12,6 +12,7 @@
 #include <unistd.h>
 
 #include "apps/focal_guess.h"
+#include "apps/readout_watch.h"
 #include "apps/unfinished.h"
 #include "output/atomic_file.h"
 #include "output/g2o.h"
@@ -327,6 +328,7 @@ RunSummary StartSummary(const std::string& command,
   summary.options = std::move(options);
   summary.camera = input.camera;
   if (input.guess) summary.calibration = SummaryOf(*input.guess, input.camera);
+  if (input.readout) summary.readout = SummaryOf(*input.readout);
   const auto count = [](std::size_t value) { return static_cast<std::int64_t>(value); };
   summary.sequence = {{"description", input.sequence->Describe()},
                       {"path", input.path},

@@ -46,6 +46,7 @@ Camera CameraOf(const SimulateFlags& flags) {
   if (flags.cx >= 0.0) camera.cx = flags.cx;
   if (flags.cy >= 0.0) camera.cy = flags.cy;
   camera.readout_s = flags.readout_s;
+  camera.knows_readout = true;
   return camera;
 }
 

@@ -85,6 +85,7 @@ std::string SummaryJson(const RunSummary& summary) {
   json["sequence"] = TableToJson(summary.sequence);
   if (summary.camera) json["camera"] = CameraToJson(*summary.camera);
   if (summary.calibration) json["calibration"] = TableToJson(*summary.calibration);
+  if (summary.readout) json["readout"] = TableToJson(*summary.readout);
   json["counts"] = TableToJson(summary.counts);
   json["seconds"] = TableToJson(summary.seconds);
   if (summary.rotodom) json["rotodom"] = TableToJson(*summary.rotodom);

@@ -41,6 +41,7 @@ struct RunSummary {
   SummaryTable sequence;
   std::optional<Camera> camera;
   std::optional<SummaryTable> calibration;  // of a camera that no calibration file gives
+  std::optional<SummaryTable> readout;      // of a sensor that no calibration file tells of
   SummaryTable counts;
   SummaryTable seconds;
   std::optional<SummaryTable> rotodom;

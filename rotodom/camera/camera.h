@@ -41,6 +41,7 @@ struct Camera {
   // it starts at a side); 0 for a global shutter.
   double readout_s = 0.0;
   ReadoutStart readout_from = ReadoutStart::kTop;
+  bool knows_readout = false;  // as its calibration says; else it is to be found out
 
   /// Pixel that shows `point_in_cam`; nullopt where the model does not reach (behind the image
   /// plane for kPinhole and kRadtan, beyond the fold of the distortion polynomial).

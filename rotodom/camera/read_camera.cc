@@ -183,6 +183,7 @@ Camera ReadOurs(const fs::path& file, const YAML::Node& root) {
   }
   camera.distortion = ReadDistortion(section, "distortion", camera.model);
   camera.readout_s = section.FiniteOrZero("readout_s");
+  camera.knows_readout = section.Has("readout_s");
   if (section.Has("readout_from")) {
     const std::string name = section.Text("readout_from");
     const auto start = FindReadoutStart(name);
@@ -489,8 +490,8 @@ std::string CameraYaml(const Camera& camera) {
     text += NumberText(camera.distortion[k]);
   }
   text += "]\n";
+  if (camera.knows_readout) text += "readout_s: " + NumberText(camera.readout_s) + "\n";
   if (camera.readout_s > 0.0) {
-    text += "readout_s: " + NumberText(camera.readout_s) + "\n";
     text += "readout_from: " + std::string(Name(camera.readout_from)) + "\n";
   }
   return text;

@@ -31,7 +31,9 @@ namespace rotslam {
 ///   cx: 367.215
 ///   cy: 248.375
 ///   distortion: [-0.283, 0.074, 0.00019, 1.8e-05, 0]
-///   readout_s: 0.02                  # rolling shutter, first row to last; left out: global
+///   readout_s: 0.02                  # rolling shutter, first row to last; 0: global; left out:
+///   not
+///                                    # known, and 0
 ///   readout_from: top                # its first row: top, bottom, left or right; left out: top
 /// `distortion` is k1 k2 p1 p2 [k3] for radtan, k1 k2 k3 k4 for equidistant, empty or left out for
 /// pinhole. Unknown keys are errors.

@@ -4,6 +4,7 @@
 
 #include "rotodom/loop/loop_closure.h"
 #include "rotodom/odometry_archive.h"
+#include "rotodom/tracking/readout.h"
 
 namespace rotslam {
 
@@ -18,6 +19,18 @@ template <class Archive>
 void TransferValue(Archive& archive, LoopReport& report) {
   auto& [checks, connections, waiting] = report;
   archive(checks, connections, waiting);
+}
+
+template <class Archive>
+void TransferValue(Archive& archive, SeenPoints& points) {
+  auto& [timestamp_s, tracks, keypoints_px] = points;
+  archive(timestamp_s, tracks, keypoints_px);
+}
+
+template <class Archive>
+void TransferValue(Archive& archive, ReadoutEstimate& readout) {
+  auto& [readout_s, readout_from, sigma_s, gain_sigmas, shear_px, noise_px, frame_s] = readout;
+  archive(readout_s, readout_from, sigma_s, gain_sigmas, shear_px, noise_px, frame_s);
 }
 
 /// One frame as AddFrame found it: to take it again without its image.

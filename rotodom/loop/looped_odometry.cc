@@ -71,6 +71,7 @@ LoopedEstimate LoopedOdometry::Take(FrameEstimate estimate, LoopReport loops) {
   looped.frame = estimate.frame;
   looped.covariance = estimate.covariance;
   looped.report = estimate.report;
+  looped.points = {estimate.timestamp_s, estimate.features.tracks, estimate.features.keypoints_px};
   orientations_.AddFrame(std::move(estimate));
   orientations_.AddLoop(std::move(loops.connections));
   looped.loops = std::move(loops.checks);

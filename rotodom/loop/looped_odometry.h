@@ -13,6 +13,7 @@
 #include "rotodom/loop/loop_closure.h"
 #include "rotodom/loop/looped_orientations.h"
 #include "rotodom/odometry.h"
+#include "rotodom/tracking/readout.h"
 
 namespace rotslam {
 
@@ -23,6 +24,7 @@ struct LoopedEstimate {
   // As in FrameEstimate: of the odometry, which loops can only make smaller.
   std::optional<Eigen::Matrix3d> covariance;
   FrameReport report;
+  SeenPoints points;             // of a replayed frame only where its record has features
   std::vector<LoopCheck> loops;  // what the frame before looked like
   bool has_averaged = false;     // orientations of older frames have moved as a loop says
 };

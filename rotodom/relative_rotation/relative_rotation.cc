@@ -8,6 +8,7 @@
 #include <Eigen/Dense>
 
 #include "rotodom/relative_rotation/consensus.h"
+#include "rotodom/relative_rotation/information_criterion.h"
 #include "rotodom/relative_rotation/refinement.h"
 #include "rotodom/types/options.h"
 
@@ -16,25 +17,12 @@ namespace {
 
 // Which rotation to believe is another question than whether there is a baseline: where both models
 // fit, as on the narrow strip that views after a long turn share, a small baseline would go into
-// the rotation. Torr's geometric information criterion for four-dimensional data (two image points
-// a match).
+// the rotation.
 // @param squared_distances, squared_flows  of all pairs under either model, rad^2.
 bool RotationExplains(const std::vector<double>& squared_distances,
                       const std::vector<double>& squared_flows,
                       double noise) {
-  const double n = static_cast<double>(squared_distances.size());
-  const double per_dimension = std::log(4.0);
-  const double per_parameter = std::log(4.0 * n);
-  const double per_variance = 1.0 / (noise * noise);
-  double epipolar = 3.0 * n * per_dimension + 5.0 * per_parameter;
-  for (const double squared : squared_distances) epipolar += std::min(squared * per_variance, 2.0);
-  double rotation = 2.0 * n * per_dimension + 3.0 * per_parameter;
-  // Both images' noise enters the difference of the bearings, so its variance per axis is twice the
-  // noise's.
-  for (const double squared : squared_flows) {
-    rotation += std::min(0.5 * squared * per_variance, 4.0);
-  }
-  return rotation < epipolar;
+  return RotationCriterion(squared_flows, noise) < EpipolarCriterion(squared_distances, noise);
 }
 
 // Whether the members' matches show a baseline.

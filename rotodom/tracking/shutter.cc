@@ -11,6 +11,15 @@
 #include "rotodom/types/rotation.h"
 
 namespace rotslam {
+namespace {
+
+Eigen::Vector3d RotationVector(const AngularMotion& motion, double seconds) {
+  const double squared = seconds * seconds;
+  const Eigen::Vector4d powers(seconds, squared, squared * seconds, squared * squared);
+  return motion.coefficients * powers;
+}
+
+}  // namespace
 
 PowerCoefficients PolynomialThrough(std::span<const TimedOffset> offsets) {
   PowerCoefficients coefficients = PowerCoefficients::Zero();
@@ -30,9 +39,22 @@ PowerCoefficients PolynomialThrough(std::span<const TimedOffset> offsets) {
 }
 
 Rotation AngularMotion::After(double seconds) const {
-  const double squared = seconds * seconds;
-  const Eigen::Vector4d powers(seconds, squared, squared * seconds, squared * squared);
-  return Rotation::Exp(coefficients * powers);
+  return Rotation::Exp(RotationVector(*this, seconds));
+}
+
+Eigen::Vector3d AngularMotion::ToMidFrame(double seconds, const Eigen::Vector3d& vector) const {
+  // Rodrigues' formula, its series where the angle leaves nothing to divide by.
+  const Eigen::Vector3d turn = RotationVector(*this, seconds);
+  const double squared_angle = turn.squaredNorm();
+  double sine_share = 1.0 - squared_angle / 6.0;
+  double versine_share = 0.5 - squared_angle / 24.0;
+  if (squared_angle > 1e-4) {
+    const double angle = std::sqrt(squared_angle);
+    sine_share = std::sin(angle) / angle;
+    versine_share = (1.0 - std::cos(angle)) / squared_angle;
+  }
+  const Eigen::Vector3d moved = vector.cross(turn);
+  return vector + sine_share * moved + versine_share * moved.cross(turn);
 }
 
 AngularMotion MotionThrough(const TimedOrientation& frame,

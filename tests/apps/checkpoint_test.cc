@@ -13,6 +13,7 @@
 #include <gtest/gtest.h>
 #include <sys/resource.h>
 
+#include "rotodom/camera/read_camera.h"
 #include "tests/apps/run_directory.h"
 #include "tests/apps/running_program.h"
 #include "tests/apps/small_sequence.h"
@@ -27,6 +28,7 @@ using testing::ElementsAre;
 using testing::EndsWith;
 using testing::HasSubstr;
 using testing::IsEmpty;
+using testing::Not;
 
 // While it lives, files can grow no further: what a disk that is full says, or a quota.
 class FileSizeLimit {
@@ -162,6 +164,46 @@ TEST_F(CheckpointedRun, GoesOnAfterCtrlCFromThatFrameAtAnyNumberOfThreads) {
   }
 }
 
+// A sequence whose shutter turns out to roll is read twice.
+TEST_F(CheckpointedRun, GoesOnInTheSecondReadingWithTheReadoutThatTheFirstHasFound) {
+  const fs::path sequence = folder_.path() / "rolling";
+  ASSERT_EQ(Rotslam({"simulate",
+                     "handheld",
+                     "--frames=45",
+                     "--readout=0.025",
+                     "--speed-scale=2",
+                     "--width=320",
+                     "--height=240",
+                     "--out=" + sequence.string()})
+                .exit_code,
+            0);
+  Camera camera = ReadCamera(sequence / "camera.yaml");
+  camera.readout_s = 0.0;
+  camera.knows_readout = false;
+  WriteCameraYaml(sequence / "camera.yaml", camera);
+  const auto command = [&](const fs::path& out) {
+    return std::vector<std::string>{"rotations",
+                                    sequence.string(),
+                                    "--out=" + out.string(),
+                                    "--no-report",
+                                    "--verbose",
+                                    "--checkpoint-every=5"};
+  };
+  const fs::path whole = folder_.path() / "whole";
+  ASSERT_EQ(Rotslam(command(whole)).exit_code, 0);
+  RunningProgram program(command(Out()));
+  ASSERT_TRUE(program.WaitFor("starts again")) << program.shown();
+  ASSERT_TRUE(program.WaitForNext("frame 12:")) << program.shown();
+  program.Send(SIGINT);
+  ASSERT_EQ(program.Finish(), 130) << program.shown();
+  EXPECT_LT(ReadTrajectory(Out() / "rotations_tum.txt").size(), 45u);
+  const CommandResult result = Rotslam(command(Out()), {"--resume"});
+  ASSERT_EQ(result.exit_code, 0) << result.error;
+  EXPECT_THAT(result.error, HasSubstr("resumed: frames 0 to "));
+  EXPECT_THAT(result.error, Not(HasSubstr("starts again")));
+  ExpectSameRun(Out(), whole);
+}
+
 TEST_F(CheckpointedRun, WritesAReportInTheEnd) {
   StopAt("frame 12:", SIGKILL);
   ASSERT_EQ(Resume({"--report"}).exit_code, 0);
@@ -194,10 +236,11 @@ TEST_F(CheckpointedRun, RefusesWhatIsNotTheSameRun) {
                     HasSubstr("leave --resume out")));
   EXPECT_THAT(RefusalToResume({"--seed=2"}), HasSubstr("the seed was 1, is now 2"));
   EXPECT_THAT(RefusalToResume({"--last=20"}), HasSubstr("the sequence was 24 files"));
-  const std::string camera =
-      folder_.Write("camera.yaml", ReadWholeFile(Good() / "camera.yaml") + "readout_s: 0.001\n")
-          .string();
-  EXPECT_THAT(RefusalToResume({"--camera=" + camera}), HasSubstr("the camera was "));
+  Camera camera = ReadCamera(Good() / "camera.yaml");
+  camera.readout_s = 0.001;
+  const fs::path file = folder_.path() / "camera.yaml";
+  WriteCameraYaml(file, camera);
+  EXPECT_THAT(RefusalToResume({"--camera=" + file.string()}), HasSubstr("the camera was "));
   EXPECT_THAT(RefusalToResume({}, "rotations"), HasSubstr("the command was run, is now rotations"));
   ASSERT_EQ(Resume().exit_code, 0);
   ExpectSameRun(Out(), InOnePiece("run"));

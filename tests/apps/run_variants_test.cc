@@ -7,12 +7,15 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include "rotodom/camera/read_camera.h"
 #include "tests/apps/run_directory.h"
 
 namespace rotslam {
 namespace {
 
 namespace fs = std::filesystem;
+
+using testing::HasSubstr;
 
 class RunVariants : public testing::Test {
  protected:
@@ -88,6 +91,38 @@ TEST_F(RunVariants, RollingShutter) {
   const fs::path sequence =
       Simulate({"--readout=0.025", "--speed-scale=2", "--width=320", "--height=240"});
   ExpectGood(sequence, Run(sequence, "out"));
+}
+
+TEST_F(RunVariants, RollingShutterThatTheCameraFileDoesNotTellOf) {
+  const fs::path sequence =
+      Simulate({"--readout=0.025", "--speed-scale=2", "--width=320", "--height=240"});
+  Camera camera = ReadCamera(sequence / "camera.yaml");
+  camera.readout_s = 0.0;
+  camera.knows_readout = false;
+  const fs::path file = folder_.path() / "unknown.yaml";
+  WriteCameraYaml(file, camera);
+  for (const std::string command : {"run", "rotations"}) {
+    SCOPED_TRACE(command);
+    const fs::path out = folder_.path() / command;
+    const CommandResult result = Rotslam({command,
+                                          sequence.string(),
+                                          "--no-report",
+                                          "--camera=" + file.string(),
+                                          "--out=" + out.string()});
+    ASSERT_EQ(result.exit_code, 0) << result.error;
+    EXPECT_THAT(result.error, HasSubstr("starts again from the first frame with readout_s: 0.02"));
+    const auto summary = ReadSummary(out);
+    EXPECT_NEAR(summary["readout"]["readout_s"].get<double>(), 0.025, 0.002);
+    EXPECT_EQ(summary["readout"]["source"], "images");
+    EXPECT_EQ(summary["camera"]["readout_s"], summary["readout"]["readout_s"]);
+  }
+  ExpectGood(sequence, folder_.path() / "run");
+}
+
+TEST_F(RunVariants, AsksForNoReadoutWhereTheCameraFileTellsIt) {
+  const fs::path sequence = Simulate({"--width=320", "--height=240"});
+  EXPECT_TRUE(ReadCamera(sequence / "camera.yaml").knows_readout);
+  EXPECT_FALSE(ReadSummary(Run(sequence, "out")).contains("readout"));
 }
 
 TEST_F(RunVariants, SameBytesEveryTimeAndAtAnyNumberOfThreads) {

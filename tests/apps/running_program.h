@@ -45,12 +45,9 @@ class RunningProgram {
   RunningProgram& operator=(const RunningProgram&) = delete;
 
   // Waits until standard error has shown `text`; false when the program ends without.
-  bool WaitFor(const std::string& text) {
-    while (shown_.find(text) == std::string::npos) {
-      if (!ReadMore()) return false;
-    }
-    return true;
-  }
+  bool WaitFor(const std::string& text) { return WaitForBehind(0, text); }
+  // The same for what it shows from now on.
+  bool WaitForNext(const std::string& text) { return WaitForBehind(shown_.size(), text); }
 
   void Send(int signal) const { kill(child_, signal); }
   const std::string& shown() const { return shown_; }
@@ -69,6 +66,13 @@ class RunningProgram {
   }
 
  private:
+  bool WaitForBehind(std::size_t place, const std::string& text) {
+    while (shown_.find(text, place) == std::string::npos) {
+      if (!ReadMore()) return false;
+    }
+    return true;
+  }
+
   bool ReadMore() {
     std::array<char, 4096> buffer = {};
     const ssize_t count = read(error_, buffer.data(), buffer.size());

@@ -78,7 +78,9 @@ TEST_F(ReadCameraTest, OursKnowsTheReadoutOfARollingShutter) {
   const std::string global =
       "model: pinhole\nwidth: 640\nheight: 480\nfx: 500\nfy: 500\ncx: 320\ncy: 240\n";
   EXPECT_EQ(Read(global).readout_s, 0.0);
+  EXPECT_FALSE(Read(global).knows_readout);
   EXPECT_EQ(Read(global + "readout_s: 0\n").readout_s, 0.0);
+  EXPECT_TRUE(Read(global + "readout_s: 0\n").knows_readout);
   EXPECT_EQ(Read(global + "readout_s: 0.0213\n").readout_s, 0.0213);
   EXPECT_THAT(Complaint(global + "readout_s: -0.01\n"), HasSubstr("readout_s is -0.01"));
   EXPECT_THAT(Complaint(global + "readout_s: 1\n"), HasSubstr("readout_s is 1"));
@@ -93,9 +95,10 @@ TEST_F(ReadCameraTest, OursKnowsTheReadoutOfARollingShutter) {
 
   Camera camera = Read(global);
   EXPECT_THAT(CameraYaml(camera), Not(HasSubstr("readout_s")));
-  for (const double readout_s : {1.0 / 30.0, 1e-9, 0.999}) {
+  camera.knows_readout = true;
+  for (const double readout_s : {0.0, 1.0 / 30.0, 1e-9, 0.999}) {
     camera.readout_s = readout_s;
-    camera.readout_from = ReadoutStart::kLeft;
+    camera.readout_from = readout_s > 0.0 ? ReadoutStart::kLeft : ReadoutStart::kTop;
     WriteCameraYaml(folder_ / "camera.yaml", camera);
     EXPECT_EQ(ReadCamera(folder_ / "camera.yaml"), camera) << CameraYaml(camera);
   }

@@ -72,6 +72,16 @@ TEST(MotionAt, IsBetterTheMoreFramesItGoesThrough) {
   EXPECT_THROW(LargestErrorRad(FrameId{9}, 2), std::invalid_argument);
 }
 
+TEST(AngularMotion, ToMidFrameUndoesAfter) {
+  AngularMotion motion;
+  motion.coefficients << 0.9, -0.2, 3.0, 1.0, -2.0, 0.5, 0.1, -4.0, 0.3, 1.1, -0.7, 2.0;
+  const Eigen::Vector3d vector(0.3, -0.5, 0.8);
+  for (const double seconds : {-0.4, -0.02, -1e-3, 0.0, 1e-9, 4e-3, 5e-3, 0.05, 1.5}) {
+    const Eigen::Vector3d back = motion.ToMidFrame(seconds, motion.After(seconds) * vector);
+    EXPECT_LT((back - vector).norm(), 1e-11) << seconds;
+  }
+}
+
 TEST(BelievedMotionAt, TellsHowFarItIsOff) {
   const auto time_s = [](FrameId at) { return at.value / 30.0; };
   const RotationMap cam_from_world = SwayingFrames(9, 1.0 / 30.0);
