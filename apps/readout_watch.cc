@@ -35,8 +35,8 @@ void ReadoutWatch::Add(FrameId frame, SeenPoints points, const OdometryResult& r
 
 void ReadoutWatch::Finish(const OdometryResult& result) {
   // Little more than at the last look tells little more.
-  const bool has_looked = next_look_ > kFirstLook;
-  if (is_on_ && (!has_looked || frames_.size() > next_look_ / 2)) Look(result);
+  const std::size_t last_look = next_look_ > kFirstLook ? next_look_ / kBetweenLooks : 0;
+  if (is_on_ && frames_.size() > last_look + last_look / 2) Look(result);
 }
 
 void ReadoutWatch::Look(const OdometryResult& result) {

@@ -109,7 +109,7 @@ struct ViewPair {
 };
 
 using Frames = std::map<FrameId, SeenPoints>;
-using Motions = std::map<FrameId, AngularMotion>;
+using Motions = std::map<FrameId, BelievedMotion>;
 
 double MedianPeriod(const Frames& frames) {
   std::vector<double> periods;
@@ -120,36 +120,46 @@ double MedianPeriod(const Frames& frames) {
 }
 
 // Of the frames that have neighbours on both sides, in time, too.
-Motions MotionsOf(const Frames& frames, const RotationMap& cam_from_world, double period_s) {
+// @param readout_s  the longest that is sought.
+Motions MotionsOf(const Frames& frames,
+                  const RotationMap& cam_from_world,
+                  double period_s,
+                  double readout_s) {
   Motions motions;
   const auto time_s = [&](FrameId frame) { return frames.at(frame).timestamp_s; };
   for (auto frame = std::next(frames.begin()); std::next(frame) != frames.end(); ++frame) {
     const double around_s = time_s(std::next(frame)->first) - time_s(std::prev(frame)->first);
     if (around_s > 3.0 * period_s) continue;
-    motions[frame->first] = MotionAt(frame->first, cam_from_world, time_s, 2);
+    motions[frame->first] = BelievedMotionAt(frame->first, cam_from_world, time_s, readout_s);
   }
   return motions;
 }
 
 // Between the two views of an edge, rad/s.
 double RateDifference(const RelativeRotation& edge, const Motions& motions) {
-  const Eigen::Vector3d rate_i = motions.at(edge.i).coefficients.col(0);
-  const Eigen::Vector3d rate_j = motions.at(edge.j).coefficients.col(0);
+  const Eigen::Vector3d rate_i = motions.at(edge.i).motion.coefficients.col(0);
+  const Eigen::Vector3d rate_j = motions.at(edge.j).motion.coefficients.col(0);
   return (rate_j - edge.j_from_i * rate_i).norm();
 }
 
 // Edges that tell most of a readout, the best first.
-std::vector<RelativeRotation> MostTellingEdges(const ViewGraph& graph, const Motions& motions) {
+std::vector<RelativeRotation> MostTellingEdges(const ViewGraph& graph,
+                                               const Motions& motions,
+                                               double focal_px) {
   struct Ranked {
     double difference = 0.0;
     double information = 0.0;
     const RelativeRotation* edge = nullptr;
   };
+  // Most rows are nearer to the middle than the ones that may be off by that error.
+  constexpr double kShareOfError = 0.5;
   std::vector<Ranked> ranked;
   for (const RelativeRotation& edge : graph.edges()) {
     if (!motions.contains(edge.i) || !motions.contains(edge.j)) continue;
     const double difference = RateDifference(edge, motions);
-    const double contrast = difference / edge.noise_px;
+    const double error_px =
+        focal_px * std::hypot(motions.at(edge.i).error_rad, motions.at(edge.j).error_rad);
+    const double contrast = difference / std::hypot(edge.noise_px, kShareOfError * error_px);
     ranked.push_back({difference, contrast * contrast * edge.num_inliers, &edge});
   }
   if (ranked.empty()) return {};
@@ -189,8 +199,8 @@ class PairMaker {
     ViewPair pair;
     pair.i = edge.i;
     pair.j = edge.j;
-    pair.motion_i = motions_.at(edge.i);
-    pair.motion_j = motions_.at(edge.j);
+    pair.motion_i = motions_.at(edge.i).motion;
+    pair.motion_j = motions_.at(edge.j).motion;
     pair.predicted_j_from_i = edge.j_from_i;
     pair.rate_difference = RateDifference(edge, motions_);
     const std::vector<TrackId> common = CommonTracks(edge);
@@ -490,10 +500,12 @@ std::optional<ReadoutEstimate> EstimateReadout(const Camera& camera,
   constexpr std::size_t kMinFrames = 4;
   if (frames.size() < kMinFrames) return std::nullopt;
   const double period_s = MedianPeriod(frames);
-  const auto motions = MotionsOf(frames, cam_from_world, period_s);
+  const double longest_s = std::min(period_s, kLongestReadout);
+  const double focal_px = camera.MeanFocal();
+  const auto motions = MotionsOf(frames, cam_from_world, period_s, longest_s);
   const PairMaker maker(camera, frames, motions);
   std::vector<ViewPair> pairs;
-  for (const RelativeRotation& edge : MostTellingEdges(graph, motions)) {
+  for (const RelativeRotation& edge : MostTellingEdges(graph, motions, focal_px)) {
     ViewPair pair = maker.Make(edge);
     if (pair.in_i.size() >= kMinMatches) pairs.push_back(std::move(pair));
   }
@@ -502,9 +514,7 @@ std::optional<ReadoutEstimate> EstimateReadout(const Camera& camera,
     return std::pair(a.i, a.j) < std::pair(b.i, b.j);
   });
 
-  const double focal_px = camera.MeanFocal();
-  const ReadoutSearch search(
-      std::move(pairs), std::min(period_s, kLongestReadout), focal_px, options, num_threads);
+  const ReadoutSearch search(std::move(pairs), longest_s, focal_px, options, num_threads);
   const auto best = search.Search();
   if (!best || best->around.IsAtAnEnd(best->at.readout.seconds)) return std::nullopt;
   ReadoutEstimate estimate;
