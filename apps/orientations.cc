@@ -197,9 +197,9 @@ Orientations FindOrientations(Input& input,
     const ReadoutEstimate& readout = *watch.found();
     progress.EndStage("the shutter rolls, read out in " + DescribeReadout(readout));
     progress.Warn(
-        "the camera file does not say how the sensor is read out, the images do: starts " +
-        std::string("again from the first frame with ") + CameraLines(readout) +
-        "; in the camera file that spares the second reading");
+        "how the sensor is read out is not known, the images tell it: starts again from the first "
+        "frame with " +
+        CameraLines(readout) + "; in the camera file that spares the second reading");
     if (checkpoint != nullptr) checkpoint->StartOver(readout);
     SetReadout(readout, input);
     input.sequence = OpenSequence(input.path, options.sequence);
