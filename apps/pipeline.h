@@ -24,7 +24,7 @@ struct ReadoutOptions {
   // Off: they have a global shutter.
   bool enabled = true;
   // Nobody asks after so many frames. More would find shutters of cameras that stand for the first
-  // half minute, and have to read that half minute again.
+  // half minute, and have to read it again.
   int max_frames = 1000;
 
   std::optional<std::string> Problem() const;

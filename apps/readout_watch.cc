@@ -26,10 +26,11 @@ ReadoutWatch::ReadoutWatch(const Camera& camera, const PipelineOptions& options,
 void ReadoutWatch::Add(FrameId frame, SeenPoints points, const OdometryResult& result) {
   if (!is_on_) return;
   frames_.emplace(frame, std::move(points));
-  if (frames_.size() < next_look_) return;
-  Look(result);
-  next_look_ *= kBetweenLooks;
-  is_on_ = is_on_ && next_look_ <= static_cast<std::size_t>(options_.max_frames);
+  if (frames_.size() == next_look_) {
+    Look(result);
+    next_look_ *= kBetweenLooks;
+  }
+  if (frames_.size() >= static_cast<std::size_t>(options_.max_frames)) is_on_ = false;
   if (!is_on_) frames_.clear();
 }
 
