@@ -476,12 +476,12 @@ class ReadoutSearch {
 
 bool ReadoutEstimate::IsRolling() const {
   // No sensor is faster that is not global. On footage of the latter up to 4.3 standard deviations
-  // were found, 6.8 and 48 on streets where the other two conditions did not hold.
+  // were found, up to 7 where the shear was less than 1.8 times the noise.
   constexpr double kShortest = 1e-3;
   constexpr double kSigmas = 5.0;
   constexpr double kGainSigmas = 2.0;
   // What is smaller is as easily a lens that is not quite known, and not worth knowing.
-  constexpr double kLeastShear = 2.0;
+  constexpr double kLeastShear = 2.5;
   return readout_s > std::max(kShortest, kSigmas * sigma_s) && gain_sigmas > kGainSigmas &&
          shear_px > kLeastShear * noise_px;
 }
