@@ -88,6 +88,10 @@ function buildNotes() {
     warn(`The camera turns in place only if its focal length is ${significant(calibration.refined_px, 5)} px, ` +
       `not ${significant(calibration.given_px, 5)} px as its calibration says; what is shown rests on that.`);
   }
+  if (summary.readout) {
+    note(`The shutter rolls: the images tell a readout of ${(1e3 * summary.readout.readout_s).toFixed(1)} ± ` +
+      `${(1e3 * summary.readout.sigma_s).toFixed(1)} ms from the ${summary.camera.readout_from}, which its calibration does not give.`);
+  }
   if (counts.unreadable_frames) note(counted(counts.unreadable_frames, 'frame') + ' could not be read.');
   if (counts.frames_without_edge) {
     note(counted(counts.frames_without_edge, 'frame') + (counts.frames_without_edge === 1 ? ' matches' : ' match') +

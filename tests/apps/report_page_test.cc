@@ -9,6 +9,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include "rotodom/camera/read_camera.h"
 #include "tests/apps/run_directory.h"
 
 namespace rotslam {
@@ -55,6 +56,7 @@ constexpr const char* kVisitor = R"js(
     seen.changed = differences(first, pixels());
     seen.clock = document.getElementById('clock').textContent;
     seen.facts = [...document.querySelectorAll('.fact')].map((fact) => fact.innerText || fact.textContent);
+    seen.notes = [...document.querySelectorAll('.note')].map((note) => note.textContent);
     seen.times = [...document.querySelectorAll('td.number')].map((cell) => cell.textContent);
     seen.charts = report.charts.length;
     seen.accuracy = [...document.querySelectorAll('#accuracy td.number')].map((cell) => cell.textContent);
@@ -102,10 +104,12 @@ class ReportPage : public testing::Test {
 
   static fs::path Sequence() { return shared_->path() / "sequence"; }
 
-  // Runs a command on the sequence, opens its report and gives what the visitor has seen.
-  static Json Visit(const std::string& command, const fs::path& out) {
+  // Runs a command on a sequence, opens its report and gives what the visitor has seen.
+  static Json Visit(const std::string& command,
+                    const fs::path& out,
+                    const fs::path& sequence = Sequence()) {
     const CommandResult result =
-        Rotslam({command, Sequence().string(), "--quiet", "--out=" + out.string()});
+        Rotslam({command, sequence.string(), "--quiet", "--out=" + out.string()});
     EXPECT_EQ(result.exit_code, 0) << result.error;
     const TemporaryFolder folder;
     const fs::path page =
@@ -186,6 +190,29 @@ TEST_F(ReportPage, ShowsOrientationsAlone) {
   const Json seen = Visit("rotations", folder_.path() / "rotations");
   ASSERT_NO_FATAL_FAILURE(ExpectAlive(seen));
   EXPECT_NE(seen.at("start"), seen.at("end"));
+}
+
+TEST_F(ReportPage, TellsOfAReadoutThatTheImagesTell) {
+  const fs::path sequence = folder_.path() / "rolling";
+  ASSERT_EQ(Rotslam({"simulate",
+                     "handheld",
+                     "--frames=45",
+                     "--readout=0.025",
+                     "--speed-scale=2",
+                     "--width=320",
+                     "--height=240",
+                     "--out=" + sequence.string()})
+                .exit_code,
+            0);
+  Camera camera = ReadCamera(sequence / "camera.yaml");
+  camera.readout_s = 0.0;
+  camera.knows_readout = false;
+  WriteCameraYaml(sequence / "camera.yaml", camera);
+  const Json seen = Visit("rotations", folder_.path() / "rotations", sequence);
+  ASSERT_FALSE(seen.contains("failure")) << seen.at("failure");
+  EXPECT_THAT(seen.at("notes").dump(),
+              testing::ContainsRegex("The shutter rolls: the images tell a readout of 2[0-9.]+ .+ "
+                                     "[0-9.]+ ms from the top"));
 }
 
 }  // namespace
