@@ -143,7 +143,7 @@ void RefineGuess(const InputFlags& flags,
     if (focal_px) {
       guess.focal_px = *focal_px;
       input.camera = CameraOf(guess, input.sequence->image_size());
-      if (input.readout) SetReadout(ReadoutEstimate(*input.readout), input);
+      if (input.readout) SetReadout(*input.readout, input);
     }
     if (std::abs(guess.focal_px - before_px) <= kFirstPassTolerance * before_px) break;
   }

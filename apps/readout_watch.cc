@@ -48,7 +48,7 @@ void ReadoutWatch::Look(const OdometryResult& result) {
   is_on_ = !found_ && !readout->IsGlobal();
 }
 
-void SetReadout(const ReadoutEstimate& readout, Input& input) {
+void SetReadout(ReadoutEstimate readout, Input& input) {
   input.readout = readout;
   input.camera.readout_s = readout.readout_s;
   input.camera.readout_from = readout.readout_from;

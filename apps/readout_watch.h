@@ -44,7 +44,7 @@ class ReadoutWatch {
 };
 
 /// Gives the input's camera that readout.
-void SetReadout(const ReadoutEstimate& readout, Input& input);
+void SetReadout(ReadoutEstimate readout, Input& input);
 
 /// In words: `20.3 +- 0.2 ms from the top`.
 std::string DescribeReadout(const ReadoutEstimate& readout);

@@ -284,13 +284,11 @@ void RotationalOdometry::DetectNewFeatures(const cv::Mat& image, View& view) {
 
 void RotationalOdometry::TakeOutShutterOf(View& view,
                                           const std::vector<const View*>& others) const {
-  // Most rows are nearer to the middle than the ones that may be off by that error.
-  constexpr double kShareOfError = 0.5;
   const auto time_s = [&](FrameId frame) { return timestamps_s_.at(frame); };
-  const auto [motion, error_rad] =
+  const BelievedMotion believed =
       BelievedMotionAt(view.features.frame, cam_from_world_, time_s, camera_.readout_s);
-  view.features.shared_error_px = kShareOfError * error_rad * camera_.MeanFocal();
-  TakeOutShutter(camera_, motion, others, view);
+  view.features.shared_error_px = believed.TypicalErrorRad() * camera_.MeanFocal();
+  TakeOutShutter(camera_, believed.motion, others, view);
 }
 
 void RotationalOdometry::TakeOutShutters(View& view, FrameEstimate& estimate) {

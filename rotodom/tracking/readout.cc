@@ -1,31 +1,24 @@
 #include "rotodom/tracking/readout.h"
 
 #include <algorithm>
-#include <array>
 #include <cmath>
 #include <cstddef>
 #include <cstdint>
-#include <iterator>
 #include <limits>
 #include <numeric>
-#include <tuple>
 #include <utility>
 
 #include "rotodom/relative_rotation/information_criterion.h"
 #include "rotodom/relative_rotation/pair_arrays.h"
 #include "rotodom/relative_rotation/refinement.h"
-#include "rotodom/tracking/shutter.h"
+#include "rotodom/tracking/readout_pairs.h"
 #include "rotodom/types/median.h"
 #include "rotodom/types/parallel.h"
 
 namespace rotslam {
 namespace {
 
-// Pairs of views that are asked, and matches of each.
-constexpr std::size_t kMaxPairs = 300;
 constexpr std::size_t kMinPairs = 10;
-constexpr std::size_t kMaxMatches = 150;
-constexpr std::size_t kMinMatches = 50;
 // No sensor that takes sequences is slower.
 constexpr double kLongestReadout = 0.05;
 // First readouts that are tried, in each direction.
@@ -33,231 +26,16 @@ constexpr int kCoarseSteps = 12;
 // Matches that agree scatter by no less, rad * focal length.
 constexpr double kLeastNoisePx = 0.05;
 
-// A signed readout: along columns (0) or rows (1) of the image, from its left or top where it is
-// positive.
-struct Readout {
-  int axis = 1;
-  double seconds = 0.0;
-};
-
 ReadoutStart StartOf(const Readout& readout) {
   const bool is_reversed = readout.seconds < 0.0;
   if (readout.axis == 0) return is_reversed ? ReadoutStart::kRight : ReadoutStart::kLeft;
   return is_reversed ? ReadoutStart::kBottom : ReadoutStart::kTop;
 }
 
-// Where a frame shows a point.
-struct Sight {
-  double late_s = 0.0;    // the middle of that frame
-  Eigen::Vector2d place;  // from the middle of the image, in its widths and heights
-  Eigen::Vector3d bearing;
-};
-
-// A point in a frame, and in the frames before and behind where both show it.
-struct SeenPoint {
-  Sight here;
-  std::optional<std::array<Sight, 2>> around;
-};
-
-struct TimedSight {
-  double after_s = 0.0;
-  Eigen::Vector3d unturned;
-};
-
-TimedSight Unturn(const Sight& sight, const AngularMotion& motion, const Readout& readout) {
-  const double after_s = sight.late_s + readout.seconds * sight.place[readout.axis];
-  return {after_s, motion.ToMidFrame(after_s, sight.bearing)};
-}
-
-Eigen::Vector3d MidFrameBearing(const SeenPoint& point,
-                                const AngularMotion& motion,
-                                const Readout& readout) {
-  const TimedSight here = Unturn(point.here, motion, readout);
-  if (!point.around) return here.unturned;
-  const TimedSight before = Unturn((*point.around)[0], motion, readout);
-  const TimedSight after = Unturn((*point.around)[1], motion, readout);
-  const double share = here.after_s / (after.after_s - before.after_s);
-  return (here.unturned - share * (after.unturned - before.unturned)).normalized();
-}
-
 // Two models of a pair of views.
 struct PairModels {
   Rotation rotation;
   EpipolarModel epipolar;
-};
-
-// Two views, and the points that both see, in the same order.
-struct ViewPair {
-  FrameId i;
-  FrameId j;
-  AngularMotion motion_i;
-  AngularMotion motion_j;
-  std::vector<SeenPoint> in_i;
-  std::vector<SeenPoint> in_j;
-  Rotation predicted_j_from_i;
-  double rate_difference = 0.0;  // rad/s: of a readout, it shears so much of every second
-
-  std::vector<BearingPair> BearingsFor(const Readout& readout) const {
-    std::vector<BearingPair> bearings;
-    bearings.reserve(in_i.size());
-    for (std::size_t n = 0; n < in_i.size(); ++n) {
-      bearings.push_back({MidFrameBearing(in_i[n], motion_i, readout),
-                          MidFrameBearing(in_j[n], motion_j, readout)});
-    }
-    return bearings;
-  }
-};
-
-using Frames = std::map<FrameId, SeenPoints>;
-using Motions = std::map<FrameId, BelievedMotion>;
-
-double MedianPeriod(const Frames& frames) {
-  std::vector<double> periods;
-  for (auto frame = frames.begin(); std::next(frame) != frames.end(); ++frame) {
-    periods.push_back(std::next(frame)->second.timestamp_s - frame->second.timestamp_s);
-  }
-  return Median(std::move(periods));
-}
-
-// Of the frames that have neighbours on both sides, in time, too.
-// @param readout_s  the longest that is sought.
-Motions MotionsOf(const Frames& frames,
-                  const RotationMap& cam_from_world,
-                  double period_s,
-                  double readout_s) {
-  Motions motions;
-  const auto time_s = [&](FrameId frame) { return frames.at(frame).timestamp_s; };
-  for (auto frame = std::next(frames.begin()); std::next(frame) != frames.end(); ++frame) {
-    const double around_s = time_s(std::next(frame)->first) - time_s(std::prev(frame)->first);
-    if (around_s > 3.0 * period_s) continue;
-    motions[frame->first] = BelievedMotionAt(frame->first, cam_from_world, time_s, readout_s);
-  }
-  return motions;
-}
-
-// Between the two views of an edge, rad/s.
-double RateDifference(const RelativeRotation& edge, const Motions& motions) {
-  const Eigen::Vector3d rate_i = motions.at(edge.i).motion.coefficients.col(0);
-  const Eigen::Vector3d rate_j = motions.at(edge.j).motion.coefficients.col(0);
-  return (rate_j - edge.j_from_i * rate_i).norm();
-}
-
-// Edges that tell most of a readout, the best first.
-std::vector<RelativeRotation> MostTellingEdges(const ViewGraph& graph,
-                                               const Motions& motions,
-                                               double focal_px) {
-  struct Ranked {
-    double difference = 0.0;
-    double information = 0.0;
-    const RelativeRotation* edge = nullptr;
-  };
-  // Most rows are nearer to the middle than the ones that may be off by that error.
-  constexpr double kShareOfError = 0.5;
-  std::vector<Ranked> ranked;
-  for (const RelativeRotation& edge : graph.edges()) {
-    if (!motions.contains(edge.i) || !motions.contains(edge.j)) continue;
-    const double difference = RateDifference(edge, motions);
-    const double error_px =
-        focal_px * std::hypot(motions.at(edge.i).error_rad, motions.at(edge.j).error_rad);
-    const double contrast = difference / std::hypot(edge.noise_px, kShareOfError * error_px);
-    ranked.push_back({difference, contrast * contrast * edge.num_inliers, &edge});
-  }
-  if (ranked.empty()) return {};
-  // Views that turn at the same rate tell of other errors: of a gimbal's fast and steady turn,
-  // tracked as if its shutter were global, half the readout.
-  constexpr double kShareOfLarge = 0.2;
-  const auto large = ranked.begin() + static_cast<std::ptrdiff_t>(ranked.size() * 9 / 10);
-  std::nth_element(ranked.begin(), large, ranked.end(), [](const Ranked& a, const Ranked& b) {
-    return a.difference < b.difference;
-  });
-  const double least = kShareOfLarge * large->difference;
-  std::erase_if(ranked, [&](const Ranked& one) { return one.difference < least; });
-  std::sort(ranked.begin(), ranked.end(), [](const Ranked& a, const Ranked& b) {
-    return std::tuple(b.information, a.edge->i, a.edge->j) <
-           std::tuple(a.information, b.edge->i, b.edge->j);
-  });
-  // Pairs that share a frame say much the same: some of many.
-  constexpr std::size_t kOfWhich = 4;
-  ranked.resize(std::min(ranked.size(), kOfWhich * kMaxPairs));
-  const std::size_t stride = std::max<std::size_t>(1, ranked.size() / kMaxPairs);
-  std::vector<RelativeRotation> edges;
-  for (std::size_t k = 0; k < ranked.size(); k += stride) edges.push_back(*ranked[k].edge);
-  return edges;
-}
-
-// Makes the pairs of views from the frames' points.
-class PairMaker {
- public:
-  PairMaker(const Camera& camera, const Frames& frames, const Motions& motions)
-      : by_columns_(camera), by_rows_(camera), frames_(frames), motions_(motions) {
-    by_columns_.readout_s = by_rows_.readout_s = 1.0;
-    by_columns_.readout_from = ReadoutStart::kLeft;
-    by_rows_.readout_from = ReadoutStart::kTop;
-  }
-
-  ViewPair Make(const RelativeRotation& edge) const {
-    ViewPair pair;
-    pair.i = edge.i;
-    pair.j = edge.j;
-    pair.motion_i = motions_.at(edge.i).motion;
-    pair.motion_j = motions_.at(edge.j).motion;
-    pair.predicted_j_from_i = edge.j_from_i;
-    pair.rate_difference = RateDifference(edge, motions_);
-    const std::vector<TrackId> common = CommonTracks(edge);
-    for (const TrackId track : common) {
-      auto in_i = PointOf(track, edge.i);
-      auto in_j = PointOf(track, edge.j);
-      if (!in_i || !in_j) continue;
-      pair.in_i.push_back(*std::move(in_i));
-      pair.in_j.push_back(*std::move(in_j));
-    }
-    return pair;
-  }
-
- private:
-  // Evenly, where there are too many.
-  std::vector<TrackId> CommonTracks(const RelativeRotation& edge) const {
-    const SeenPoints& i = frames_.at(edge.i);
-    const SeenPoints& j = frames_.at(edge.j);
-    std::vector<TrackId> all;
-    std::set_intersection(i.tracks.begin(),
-                          i.tracks.end(),
-                          j.tracks.begin(),
-                          j.tracks.end(),
-                          std::back_inserter(all));
-    if (all.size() <= kMaxMatches) return all;
-    std::vector<TrackId> some;
-    for (std::size_t k = 0; k < kMaxMatches; ++k) some.push_back(all[k * all.size() / kMaxMatches]);
-    return some;
-  }
-
-  std::optional<Sight> SightOf(TrackId track, const SeenPoints& frame, double mid_s) const {
-    const auto found = std::lower_bound(frame.tracks.begin(), frame.tracks.end(), track);
-    if (found == frame.tracks.end() || *found != track) return std::nullopt;
-    const Eigen::Vector2d& keypoint_px = frame.keypoints_px[found - frame.tracks.begin()];
-    const auto bearing = by_rows_.Unproject(keypoint_px);
-    if (!bearing) return std::nullopt;
-    const Eigen::Vector2d place(by_columns_.ExposureTime(keypoint_px),
-                                by_rows_.ExposureTime(keypoint_px));
-    return Sight{frame.timestamp_s - mid_s, place, *bearing};
-  }
-
-  std::optional<SeenPoint> PointOf(TrackId track, FrameId frame) const {
-    const auto at = frames_.find(frame);
-    const double mid_s = at->second.timestamp_s;
-    const auto here = SightOf(track, at->second, mid_s);
-    if (!here) return std::nullopt;
-    SeenPoint point{*here, std::nullopt};
-    const auto before = SightOf(track, std::prev(at)->second, mid_s);
-    const auto after = SightOf(track, std::next(at)->second, mid_s);
-    if (before && after) point.around = {*before, *after};
-    return point;
-  }
-
-  Camera by_columns_;
-  Camera by_rows_;
-  const Frames& frames_;
-  const Motions& motions_;
 };
 
 double Sum(const std::vector<double>& values) {
@@ -502,18 +280,8 @@ std::optional<ReadoutEstimate> EstimateReadout(const Camera& camera,
   const double period_s = MedianPeriod(frames);
   const double longest_s = std::min(period_s, kLongestReadout);
   const double focal_px = camera.MeanFocal();
-  const auto motions = MotionsOf(frames, cam_from_world, period_s, longest_s);
-  const PairMaker maker(camera, frames, motions);
-  std::vector<ViewPair> pairs;
-  for (const RelativeRotation& edge : MostTellingEdges(graph, motions, focal_px)) {
-    ViewPair pair = maker.Make(edge);
-    if (pair.in_i.size() >= kMinMatches) pairs.push_back(std::move(pair));
-  }
+  std::vector<ViewPair> pairs = PairsThatTell(camera, frames, graph, cam_from_world, longest_s);
   if (pairs.size() < kMinPairs) return std::nullopt;
-  std::sort(pairs.begin(), pairs.end(), [](const ViewPair& a, const ViewPair& b) {
-    return std::pair(a.i, a.j) < std::pair(b.i, b.j);
-  });
-
   const ReadoutSearch search(std::move(pairs), longest_s, focal_px, options, num_threads);
   const auto best = search.Search();
   if (!best || best->around.IsAtAnEnd(best->at.readout.seconds)) return std::nullopt;

@@ -58,7 +58,7 @@ struct ReadoutEstimate {
 /// Error:   from 120 frames 0 to 5 % on rendered walks, gimbals and streets with 20 to 40 ms, 0 to
 ///          3 % on panoramas resampled with 10 to 30 ms; of a Kinect 20 to 28 ms from seven parts
 ///          of 120 to 200 frames, 10 ms from an eighth, which IsRolling() does not believe.
-/// Cost:    1 to 2 s (300 pairs with 150 matches, one thread).
+/// Cost:    1 to 3 s (300 to 600 pairs with 150 matches, one thread).
 std::optional<ReadoutEstimate> EstimateReadout(const Camera& camera,
                                                const std::map<FrameId, SeenPoints>& frames,
                                                const ViewGraph& graph,

@@ -62,6 +62,9 @@ AngularMotion MotionAt(FrameId frame,
 struct BelievedMotion {
   AngularMotion motion;
   double error_rad = 0.0;
+
+  /// The same of most rows, which are nearer to the middle than the ones that are off by that.
+  double TypicalErrorRad() const { return 0.5 * error_rad; }
 };
 
 /// MotionAt through two other frames; what a third would make of it tells the error. Going through

@@ -22,10 +22,12 @@ int CountCommonTracks(const std::vector<TrackId>& a, const std::vector<TrackId>&
   return count;
 }
 
-int FindTrack(const Features& features, TrackId track) {
-  const auto found = std::lower_bound(features.tracks.begin(), features.tracks.end(), track);
-  if (found == features.tracks.end() || *found != track) return -1;
-  return static_cast<int>(found - features.tracks.begin());
+int FindTrack(const Features& features, TrackId track) { return FindTrack(features.tracks, track); }
+
+int FindTrack(const std::vector<TrackId>& tracks, TrackId track) {
+  const auto found = std::lower_bound(tracks.begin(), tracks.end(), track);
+  if (found == tracks.end() || *found != track) return -1;
+  return static_cast<int>(found - tracks.begin());
 }
 
 }  // namespace rotslam

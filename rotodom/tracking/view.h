@@ -33,5 +33,7 @@ int CountCommonTracks(const Features& a, const Features& b);
 
 /// Position in `features` of `track`, -1 when the frame does not show it.
 int FindTrack(const Features& features, TrackId track);
+/// The same of a list that ascends.
+int FindTrack(const std::vector<TrackId>& tracks, TrackId track);
 
 }  // namespace rotslam

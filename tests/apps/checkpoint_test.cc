@@ -17,6 +17,7 @@
 #include "tests/apps/run_directory.h"
 #include "tests/apps/running_program.h"
 #include "tests/apps/small_sequence.h"
+#include "tests/apps/unknown_readout.h"
 
 namespace rotslam {
 namespace {
@@ -167,20 +168,7 @@ TEST_F(CheckpointedRun, GoesOnAfterCtrlCFromThatFrameAtAnyNumberOfThreads) {
 // A sequence whose shutter turns out to roll is read twice.
 TEST_F(CheckpointedRun, GoesOnInTheSecondReadingWithTheReadoutThatTheFirstHasFound) {
   const fs::path sequence = folder_.path() / "rolling";
-  ASSERT_EQ(Rotslam({"simulate",
-                     "handheld",
-                     "--frames=45",
-                     "--readout=0.025",
-                     "--speed-scale=2",
-                     "--width=320",
-                     "--height=240",
-                     "--out=" + sequence.string()})
-                .exit_code,
-            0);
-  Camera camera = ReadCamera(sequence / "camera.yaml");
-  camera.readout_s = 0.0;
-  camera.knows_readout = false;
-  WriteCameraYaml(sequence / "camera.yaml", camera);
+  ASSERT_NO_FATAL_FAILURE(SimulateUnknownReadout(sequence));
   const auto command = [&](const fs::path& out) {
     return std::vector<std::string>{"rotations",
                                     sequence.string(),

@@ -9,8 +9,8 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-#include "rotodom/camera/read_camera.h"
 #include "tests/apps/run_directory.h"
+#include "tests/apps/unknown_readout.h"
 
 namespace rotslam {
 namespace {
@@ -194,20 +194,7 @@ TEST_F(ReportPage, ShowsOrientationsAlone) {
 
 TEST_F(ReportPage, TellsOfAReadoutThatTheImagesTell) {
   const fs::path sequence = folder_.path() / "rolling";
-  ASSERT_EQ(Rotslam({"simulate",
-                     "handheld",
-                     "--frames=45",
-                     "--readout=0.025",
-                     "--speed-scale=2",
-                     "--width=320",
-                     "--height=240",
-                     "--out=" + sequence.string()})
-                .exit_code,
-            0);
-  Camera camera = ReadCamera(sequence / "camera.yaml");
-  camera.readout_s = 0.0;
-  camera.knows_readout = false;
-  WriteCameraYaml(sequence / "camera.yaml", camera);
+  ASSERT_NO_FATAL_FAILURE(SimulateUnknownReadout(sequence));
   const Json seen = Visit("rotations", folder_.path() / "rotations", sequence);
   ASSERT_FALSE(seen.contains("failure")) << seen.at("failure");
   EXPECT_THAT(seen.at("notes").dump(),

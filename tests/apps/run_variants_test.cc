@@ -9,6 +9,7 @@
 
 #include "rotodom/camera/read_camera.h"
 #include "tests/apps/run_directory.h"
+#include "tests/apps/unknown_readout.h"
 
 namespace rotslam {
 namespace {
@@ -94,21 +95,13 @@ TEST_F(RunVariants, RollingShutter) {
 }
 
 TEST_F(RunVariants, RollingShutterThatTheCameraFileDoesNotTellOf) {
-  const fs::path sequence =
-      Simulate({"--readout=0.025", "--speed-scale=2", "--width=320", "--height=240"});
-  Camera camera = ReadCamera(sequence / "camera.yaml");
-  camera.readout_s = 0.0;
-  camera.knows_readout = false;
-  const fs::path file = folder_.path() / "unknown.yaml";
-  WriteCameraYaml(file, camera);
+  const fs::path sequence = folder_.path() / "sequence";
+  ASSERT_NO_FATAL_FAILURE(SimulateUnknownReadout(sequence));
   for (const std::string command : {"run", "rotations"}) {
     SCOPED_TRACE(command);
     const fs::path out = folder_.path() / command;
-    const CommandResult result = Rotslam({command,
-                                          sequence.string(),
-                                          "--no-report",
-                                          "--camera=" + file.string(),
-                                          "--out=" + out.string()});
+    const CommandResult result =
+        Rotslam({command, sequence.string(), "--no-report", "--out=" + out.string()});
     ASSERT_EQ(result.exit_code, 0) << result.error;
     EXPECT_THAT(result.error, HasSubstr("starts again from the first frame with readout_s: 0.02"));
     const auto summary = ReadSummary(out);
