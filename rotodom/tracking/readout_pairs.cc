@@ -23,7 +23,7 @@ struct TimedSight {
   Eigen::Vector3d unturned;
 };
 
-TimedSight Unturn(const Sight& sight, const AngularMotion& motion, const Readout& readout) {
+TimedSight Unturn(const FrameSight& sight, const AngularMotion& motion, const Readout& readout) {
   const double after_s = sight.late_s + readout.seconds * sight.place[readout.axis];
   return {after_s, motion.ToMidFrame(after_s, sight.bearing)};
 }
@@ -152,7 +152,7 @@ class PairMaker {
     return some;
   }
 
-  std::optional<Sight> SightOf(TrackId track, const SeenPoints& frame, double mid_s) const {
+  std::optional<FrameSight> SightOf(TrackId track, const SeenPoints& frame, double mid_s) const {
     const int index = FindTrack(frame.tracks, track);
     if (index < 0) return std::nullopt;
     const Eigen::Vector2d& keypoint_px = frame.keypoints_px[index];
@@ -160,7 +160,7 @@ class PairMaker {
     if (!bearing) return std::nullopt;
     const Eigen::Vector2d place(by_columns_.ExposureTime(keypoint_px),
                                 by_rows_.ExposureTime(keypoint_px));
-    return Sight{frame.timestamp_s - mid_s, place, *bearing};
+    return FrameSight{frame.timestamp_s - mid_s, place, *bearing};
   }
 
   std::optional<SeenPoint> PointOf(TrackId track, FrameId frame) const {

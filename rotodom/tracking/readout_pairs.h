@@ -21,7 +21,7 @@ struct Readout {
 };
 
 /// Where a frame shows a point.
-struct Sight {
+struct FrameSight {
   double late_s = 0.0;    // the middle of that frame
   Eigen::Vector2d place;  // from the middle of the image, in its widths and heights
   Eigen::Vector3d bearing;
@@ -29,8 +29,8 @@ struct Sight {
 
 /// A point in a frame, and in the frames before and behind where both show it.
 struct SeenPoint {
-  Sight here;
-  std::optional<std::array<Sight, 2>> around;
+  FrameSight here;
+  std::optional<std::array<FrameSight, 2>> around;
 };
 
 /// Two views, and the points that both see, in the same order.
