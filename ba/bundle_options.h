@@ -103,11 +103,11 @@ struct BundleOptions {
   // drift. So from the fine round on the loss leaves the quadratic at this many spreads of the
   // residuals that the round before has left, and observations are kept within that many, where
   // that is less than the round allows. A spread is the median residual, in sigmas, freed of what
-  // points take off by fitting. On simulated walks and drives errors fall to 0.3 to 0.9 of those
-  // with the round's own widths; where residuals are as wide as sigma_px says nothing changes. A
-  // limit alone needs 4 spreads for that, and EuRoC then loses 3 %. The closer the two are, the
-  // less is left for an adjustment without a loss: COLMAP's takes 1.4 % off the cost of KITTI 00,
-  // with 2 and 6 spreads 3.8 %. 0: as the round has it.
+  // points take off by fitting, in steps of a quarter octave. On simulated walks and drives errors
+  // fall to 0.3 to 0.9 of those with the round's own widths; where residuals are as wide as
+  // sigma_px says nothing changes. A limit alone needs 4 spreads for that, and EuRoC then loses
+  // 3 %. The closer the two are, the less is left for an adjustment without a loss: COLMAP's takes
+  // 1.4 % off the cost of KITTI 00, with 2 and 6 spreads 3.8 %. 0: as the round has it.
   double loss_spreads = 3.0;
   double limit_spreads = 5.0;
   // Closing is repeated, so many times at most, until classification changes less than this share

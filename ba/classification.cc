@@ -66,10 +66,11 @@ class Classifier {
         min_observations_(options.min_observations),
         min_angle_rad_(options.min_angle_deg * kRadFromDeg) {}
 
-  // Marks the observations that the track's position, or else a better one, explains.
+  // Marks the observations that the best position explains: of all, or the one downhill from the
+  // track's own.
   void Classify(bool anywhere, TrackState& track) const {
     Best best;
-    if (track.has_position) Offer(track, track.position, best);
+    if (!anywhere && track.has_position) Offer(track, track.position, best);
     if (best.num_misfits > 0) {
       // A step can have thrown a point behind all cameras.
       const bool is_lost = track.kind != TrackKind::kOut && best.verdict.num_fits == 0;

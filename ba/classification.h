@@ -6,8 +6,10 @@ namespace rotslam {
 
 /// Where classification looks for a track's position.
 enum class Placement {
-  kAnywhere,  // from all observations and from pairs, too
-  kNearby,    // from where it is, downhill
+  // From all observations and from pairs: what is found goes by where the cameras are, not by how
+  // they got there.
+  kAnywhere,
+  kNearby,  // from where it is, downhill
   kStays,
 };
 

@@ -78,6 +78,30 @@ TEST_F(SharedData, Kitti00) {
   EXPECT_LE(NumHeldFrames(), 2);  // of 200; straight road and a turn of 90 deg
 }
 
+// On the same tracks of every second frame, to a thousandth of the observations and of the cost.
+TEST_F(SharedData, Kitti00EndsInOneMinimumFromThreeStarts) {
+  ROTSLAM_SKIP_WITHOUT("kitti00");
+  const fs::path config = Out().parent_path() / "config.yaml";
+  std::ofstream(config) << "keyframes:\n  every_frames: 2\n";
+  ASSERT_NO_FATAL_FAILURE(
+      Do("run", "kitti00", {"--config", config.string(), "--no-certificate", "--no-report"}));
+  std::vector<int> observations;
+  std::vector<double> costs;
+  for (const std::string start : {"l1", "bisection", "linear"}) {
+    const fs::path out = Out().parent_path() / start;
+    const CommandResult result =
+        Rotslam({"solve", Out().string(), "--out", out.string(), "--krot", start}, {});
+    ASSERT_EQ(result.exit_code, 0) << result.error;
+    const auto ba = ReadSummary(out)["ba"];
+    observations.push_back(ba["observations"]);
+    costs.push_back(ba["final_cost"]);
+  }
+  const auto [fewest, most] = std::ranges::minmax(observations);
+  const auto [least, greatest] = std::ranges::minmax(costs);
+  EXPECT_LE(most - fewest, 1e-3 * fewest);
+  EXPECT_LE(greatest - least, 1e-3 * least);
+}
+
 TEST_F(SharedData, SevenScenesKitchen) {
   ROTSLAM_SKIP_WITHOUT("7scenes_kitchen");
   ASSERT_NO_FATAL_FAILURE(Do("run", "7scenes_kitchen", {"--camera", Camera("7scenes.yaml")}));

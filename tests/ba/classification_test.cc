@@ -52,6 +52,17 @@ TEST(ClassifyAll, LooksForPointsAgainThatAStepHasThrownBehindTheCameras) {
   EXPECT_LT((track.position - position).norm(), 0.05 * position.norm());
 }
 
+TEST(ClassifyAll, AnywhereFindsTheSamePointsFromWhereverTheyWere) {
+  ClassifiedScene scene({.noise_px = 0.5, .outlier_ratio = 0.05});
+  const std::vector<TrackState> found = scene.state.tracks;
+  for (TrackState& track : scene.state.tracks) track.position *= 1.001;
+  ClassifyAll(scene.options.fine, Placement::kAnywhere, scene.options, scene.state);
+  for (std::size_t t = 0; t < found.size(); ++t) {
+    EXPECT_EQ(scene.state.tracks[t].kind, found[t].kind);
+    EXPECT_EQ(scene.state.tracks[t].position, found[t].position);
+  }
+}
+
 TEST(ResidualSpread, IsThatOfTheNoise) {
   // Of a length in two dimensions the median is 1.177 standard deviations. Points that are fitted
   // to the noise take a fifth off, which the spread undoes; those here are fitted roughly.
