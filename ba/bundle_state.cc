@@ -103,7 +103,9 @@ void SetTrack(const Track& track,
   for (const Observation& observation : track.observations) {
     const auto frame = frame_index.find(observation.frame);
     if (frame == frame_index.end()) continue;
-    entry.sights.push_back({&observation, observation.bearing, frame->second, false});
+    const auto bearing = state.camera.Unproject(observation.keypoint_px);
+    entry.sights.push_back(
+        {&observation, bearing.value_or(observation.bearing), frame->second, false});
     places.insert(state.frames[frame->second].center);
   }
   entry.one_place = places.size() <= 1;
