@@ -19,8 +19,8 @@ namespace {
 
 // Smallest spread of residuals, in sigmas, that anything is fitted to.
 constexpr double kLeastSpread = 0.01;
-// Steps of such a spread in an octave. Starts that end in the same place leave spreads that are a
-// thousandth apart; with widths of their own they would end at costs that are a hundredth apart.
+// Steps of such a spread in an octave. Starts that end in the same place leave spreads that are one
+// to three thousandths apart; with widths of their own they would end at costs as far apart.
 constexpr double kSpreadSteps = 4.0;
 
 bool AllFinite(const BundleState& state) {
@@ -99,8 +99,9 @@ class Rounds {
 
   // The fine round with its loss and its limit as wide as the residuals are (`loss_spreads`).
   BundleRound FineFor(const BundleState& state) const {
-    const double measured = std::max(kLeastSpread, ResidualSpread(state));
-    const double spread = std::exp2(std::round(kSpreadSteps * std::log2(measured)) / kSpreadSteps);
+    const double octaves = std::log2(ResidualSpread(state));
+    const double spread =
+        std::max(kLeastSpread, std::exp2(std::round(kSpreadSteps * octaves) / kSpreadSteps));
     const auto narrow = [&](double spreads, double width) {
       return spreads > 0.0 ? std::min(width, spreads * spread) : width;
     };

@@ -19,8 +19,8 @@ namespace rotslam {
 struct BundleProblem {
   Camera camera;
   /// Poses in any gauge, and tracks with observations in pixels; bearings are the camera's of
-  /// these. Points are optional: all are triangulated. Observations in frames without a pose are
-  /// left out.
+  /// these. Its points are not looked at: all are triangulated. Observations in frames without a
+  /// pose are left out.
   Reconstruction start;
   /// Frame -> frame at whose place it stands. Through a pure rotation there is one centre, so there
   /// is one parameter block: positions come out equal to the last bit. Chains are followed.

@@ -103,9 +103,7 @@ void SetTrack(const Track& track,
   for (const Observation& observation : track.observations) {
     const auto frame = frame_index.find(observation.frame);
     if (frame == frame_index.end()) continue;
-    const auto bearing = state.camera.Unproject(observation.keypoint_px);
-    entry.sights.push_back(
-        {&observation, bearing.value_or(observation.bearing), frame->second, false});
+    entry.sights.push_back({&observation, observation.bearing, frame->second, false});
     places.insert(state.frames[frame->second].center);
   }
   entry.one_place = places.size() <= 1;
@@ -135,13 +133,9 @@ BundleState MakeBundleState(const BundleProblem& problem, const BundleOptions& o
   for (const Track& track : start.tracks) {
     TrackState entry;
     SetTrack(track, frame_index, state, entry);
-    const auto point = start.point_in_world.find(track.id);
-    if (point != start.point_in_world.end() && !entry.one_place) {
-      entry.has_position = true;
-      entry.position = point->second;
-    }
     state.tracks.push_back(std::move(entry));
   }
+  SetCamera(state.camera, state);
   return state;
 }
 

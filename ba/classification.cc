@@ -66,8 +66,8 @@ class Classifier {
         min_observations_(options.min_observations),
         min_angle_rad_(options.min_angle_deg * kRadFromDeg) {}
 
-  // Marks the observations that the best position explains: of all, or the one downhill from the
-  // track's own.
+  // Marks the observations that the track's position, or else a better one downhill from it,
+  // explains; anywhere, those that the best of all positions does.
   void Classify(bool anywhere, TrackState& track) const {
     Best best;
     if (!anywhere && track.has_position) Offer(track, track.position, best);
