@@ -42,11 +42,12 @@ void KrotFlags::Override(KrotOptions& options) const {
 
 void AddKrotFlags(CLI::App& command, KrotFlags& flags) {
   command
-      .add_option("--krot",
-                  flags.start,
-                  "Which answer bundle adjustment starts from: l1 (least sum of misses; default), "
-                  "bisection (least largest residual) or linear (equations between the centres)")
-      ->check(CLI::IsMember({"l1", "bisection", "linear"}));
+      .add_option(
+          "--krot",
+          flags.start,
+          "Which answer bundle adjustment starts from: l1 (least sum of misses; default), "
+          "bisection (least largest residual) or positioning (rays nearest to what was seen)")
+      ->check(CLI::IsMember({"l1", "bisection", "positioning"}));
   command.add_flag("--no-certificate",
                    flags.no_certificate,
                    "Do not bound how far the largest residual is from the least possible");

@@ -7,8 +7,8 @@
 #include <utility>
 
 #include "krot/blocks.h"
+#include "krot/global_positioning.h"
 #include "krot/growth.h"
-#include "krot/linear_start.h"
 #include "krot/named_problem.h"
 #include "krot/robust_triangulation.h"
 #include "krot/selection.h"
@@ -16,31 +16,8 @@
 namespace rotslam {
 namespace {
 
-// The observations of `problem` with residual at most `limit`, without points then seen once. Every
-// view stays, so the gauge does.
-MinimaxProblem Survivors(const MinimaxProblem& problem,
-                         const std::vector<double>& residuals,
-                         double limit) {
-  std::vector<int> count(problem.num_points, 0);
-  for (std::size_t o = 0; o < problem.observations.size(); ++o) {
-    if (residuals[o] <= limit) ++count[problem.observations[o].point];
-  }
-  MinimaxProblem survivors;
-  survivors.R_c_w = problem.R_c_w;
-  std::vector<int> new_point(problem.num_points, -1);
-  for (int i = 0; i < problem.num_points; ++i) {
-    if (count[i] >= 2) new_point[i] = survivors.num_points++;
-  }
-  for (std::size_t o = 0; o < problem.observations.size(); ++o) {
-    ImageObservation observation = problem.observations[o];
-    if (residuals[o] > limit || new_point[observation.point] < 0) continue;
-    observation.point = new_point[observation.point];
-    survivors.observations.push_back(observation);
-  }
-  return survivors;
-}
-
-std::optional<ComponentStart> SolvePrograms(const RotationMap& cam_from_world,
+// Positions of the tracks' views from a spread of the tracks.
+std::optional<ComponentStart> SolveSelected(const RotationMap& cam_from_world,
                                             const std::vector<Track>& tracks,
                                             const KrotOptions& options,
                                             const KrotUnits& units) {
@@ -51,15 +28,16 @@ std::optional<ComponentStart> SolvePrograms(const RotationMap& cam_from_world,
   for (const int t : SelectTracks(cam_from_world, tracks, selection)) selected.push_back(tracks[t]);
   const NamedProblem named = MakeProblem(cam_from_world, selected);
   if (named.problem.num_views() < 2) return std::nullopt;
-  RobustStart robust = SolveRobustStart(named.problem, units.gamma, options.robust_start);
-  if (robust.call != LpCallStatus::kCompleted) return std::nullopt;
-  const MinimaxProblem survivors = Survivors(named.problem, robust.residuals, 1.001 * units.gamma);
-  if (survivors.observations.empty()) return std::nullopt;
-  std::optional<MinimaxStructure> structure = std::move(robust.structure);
-  if (options.start == "linear") structure = SolveLinearStart(survivors);
-  if (!structure) return std::nullopt;
   ComponentStart start;
-  start.num_programs = robust.num_programs;
+  std::optional<MinimaxStructure> structure;
+  if (options.start == "positioning") {
+    structure = SolveGlobalPositioning(named.problem, units.loose_rad);
+  } else {
+    RobustStart robust = SolveRobustStart(named.problem, units.gamma, options.robust_start);
+    start.num_programs = robust.num_programs;
+    if (robust.call == LpCallStatus::kCompleted) structure = std::move(robust.structure);
+  }
+  if (!structure) return std::nullopt;
   for (int view = 0; view < named.problem.num_views(); ++view) {
     start.centers[named.views[view]] = structure->center_in_world[view];
   }
@@ -141,7 +119,7 @@ std::optional<ComponentStart> SolveInBlocks(const RotationMap& cam_from_world,
          FindComponents(cam_from_world, piece_tracks, component_options)) {
       const std::set<FrameId> views(part.views.begin(), part.views.end());
       const auto part_tracks = TracksOf(views, piece_tracks, units.min_z);
-      const auto solved = SolvePrograms(cam_from_world, part_tracks, options, units);
+      const auto solved = SolveSelected(cam_from_world, part_tracks, options, units);
       if (!solved) continue;
       start.num_programs += solved->num_programs;
       std::ranges::move(
@@ -165,7 +143,7 @@ std::optional<ComponentStart> StartComponent(const RotationMap& cam_from_world,
   const std::set<FrameId> members(component.views.begin(), component.views.end());
   std::optional<ComponentStart> start =
       component.views.size() <= static_cast<std::size_t>(options.max_lp_views)
-          ? SolvePrograms(cam_from_world, TracksOf(members, tracks, units.min_z), options, units)
+          ? SolveSelected(cam_from_world, TracksOf(members, tracks, units.min_z), options, units)
           : SolveInBlocks(cam_from_world, tracks, component, component_options, options, units);
   if (!start || start->centers.size() == component.views.size()) return start;
   GrowthOptions growth;

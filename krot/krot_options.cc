@@ -8,8 +8,8 @@
 namespace rotslam {
 
 std::optional<std::string> KrotOptions::Problem() const {
-  if (start != "l1" && start != "bisection" && start != "linear") {
-    return "start is '" + start + "', must be l1, bisection or linear";
+  if (start != "l1" && start != "bisection" && start != "positioning") {
+    return "start is '" + start + "', must be l1, bisection or positioning";
   }
   if (start == "bisection" && !use_bracket) {
     return "start is 'bisection', which needs use_bracket";

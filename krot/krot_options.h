@@ -14,8 +14,8 @@ namespace rotslam {
 struct KrotOptions {
   // Which answer gives the positions: "l1", the least sum of misses, forgives outliers and is the
   // better start for bundle adjustment; "bisection", the least largest residual of what l1 kept;
-  // "linear", equations between the centres (SolveLinearStart) on the same. All lead bundle
-  // adjustment to one minimum.
+  // "positioning", rays nearest to what was seen (SolveGlobalPositioning), without linear programs.
+  // All lead bundle adjustment to one minimum.
   // The bracket is found either way (see use_bracket).
   std::string start = "l1";
   // Image bound of the L1 start: observations within it cost nothing. It must cover feature noise

@@ -138,7 +138,7 @@ TEST_F(Batch, SurvivesABrokenSequenceAndGoesOnWhereItStopped) {
 
   // A run that lost its end, and one with other options, are not done.
   fs::resize_file(Out() / "gimbal/summary.json", 100);
-  const fs::path changed = List("{krot: {start: linear}}");
+  const fs::path changed = List("{krot: {start: positioning}}");
   EXPECT_EQ(RunBatch(changed, {"--collect"}).exit_code, 1);
   results = Results();
   EXPECT_EQ(results["walk"]["status"], "outdated");
@@ -150,7 +150,7 @@ TEST_F(Batch, SurvivesABrokenSequenceAndGoesOnWhereItStopped) {
                     HasSubstr("<a href=\"walk/report.html\">walk</a>"),
                     Not(HasSubstr("broken/report.html"))));
   EXPECT_NE(Written(Out() / "walk/summary.json"), walk_written);
-  EXPECT_EQ(ReadSummary(Out() / "walk")["options"]["krot"]["start"], "linear");
+  EXPECT_EQ(ReadSummary(Out() / "walk")["options"]["krot"]["start"], "positioning");
   results = Results();
   EXPECT_EQ(results["walk"]["status"], "done");
   EXPECT_EQ(results["gimbal"]["status"], "done");

@@ -118,9 +118,11 @@ TEST_F(Completion, OffersTheOptionsOfTheCommand) {
 }
 
 TEST_F(Completion, OffersValuesAndElseFiles) {
-  EXPECT_THAT(Offers({"rotslam", "run", "--krot", ""}), ElementsAre("l1", "bisection", "linear"));
+  EXPECT_THAT(Offers({"rotslam", "run", "--krot", ""}),
+              ElementsAre("l1", "bisection", "positioning"));
   EXPECT_THAT(Offers({"rotslam", "run", "--krot", "=", "bi"}), ElementsAre("bisection"));
-  EXPECT_THAT(Offers({"rotslam", "run", "--krot", "="}), ElementsAre("l1", "bisection", "linear"));
+  EXPECT_THAT(Offers({"rotslam", "run", "--krot", "="}),
+              ElementsAre("l1", "bisection", "positioning"));
   EXPECT_THAT(Offers({"rotslam", "simulate", "g"}), ElementsAre("gimbal"));
   // bash itself goes on to files where nothing is offered.
   EXPECT_THAT(Offers({"rotslam", "run", "--camera", ""}), IsEmpty());

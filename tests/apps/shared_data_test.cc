@@ -38,6 +38,25 @@ class SharedData : public testing::Test {
     EXPECT_THAT(result.error, testing::Not(testing::HasSubstr("Logging")));  // of libraries
   }
 
+  // Solves what Out() holds from each start, to a thousandth of the observations and of the cost.
+  void ExpectOneMinimumFromThreeStarts() const {
+    std::vector<int> observations;
+    std::vector<double> costs;
+    for (const std::string start : {"l1", "bisection", "positioning"}) {
+      const fs::path out = Out().parent_path() / start;
+      const CommandResult result =
+          Rotslam({"solve", Out().string(), "--out", out.string(), "--krot", start}, {});
+      ASSERT_EQ(result.exit_code, 0) << result.error;
+      const auto ba = ReadSummary(out)["ba"];
+      observations.push_back(ba["observations"]);
+      costs.push_back(ba["final_cost"]);
+    }
+    const auto [fewest, most] = std::ranges::minmax(observations);
+    const auto [least, greatest] = std::ranges::minmax(costs);
+    EXPECT_LE(most - fewest, 1e-3 * fewest);
+    EXPECT_LE(greatest - least, 1e-3 * least);
+  }
+
   fs::path Out() const { return folder_.path() / "out"; }
 
   // Frames that segments.csv says rotate in place or stand still.
@@ -78,28 +97,20 @@ TEST_F(SharedData, Kitti00) {
   EXPECT_LE(NumHeldFrames(), 2);  // of 200; straight road and a turn of 90 deg
 }
 
-// On the same tracks of every second frame, to a thousandth of the observations and of the cost.
+// Every second frame a keyframe.
 TEST_F(SharedData, Kitti00EndsInOneMinimumFromThreeStarts) {
   ROTSLAM_SKIP_WITHOUT("kitti00");
   const fs::path config = Out().parent_path() / "config.yaml";
   std::ofstream(config) << "keyframes:\n  every_frames: 2\n";
   ASSERT_NO_FATAL_FAILURE(
       Do("run", "kitti00", {"--config", config.string(), "--no-certificate", "--no-report"}));
-  std::vector<int> observations;
-  std::vector<double> costs;
-  for (const std::string start : {"l1", "bisection", "linear"}) {
-    const fs::path out = Out().parent_path() / start;
-    const CommandResult result =
-        Rotslam({"solve", Out().string(), "--out", out.string(), "--krot", start}, {});
-    ASSERT_EQ(result.exit_code, 0) << result.error;
-    const auto ba = ReadSummary(out)["ba"];
-    observations.push_back(ba["observations"]);
-    costs.push_back(ba["final_cost"]);
-  }
-  const auto [fewest, most] = std::ranges::minmax(observations);
-  const auto [least, greatest] = std::ranges::minmax(costs);
-  EXPECT_LE(most - fewest, 1e-3 * fewest);
-  EXPECT_LE(greatest - least, 1e-3 * least);
+  ExpectOneMinimumFromThreeStarts();
+}
+
+TEST_F(SharedData, EurocV101EndsInOneMinimumFromThreeStarts) {
+  ROTSLAM_SKIP_WITHOUT("euroc_v101_keyframes");
+  ASSERT_NO_FATAL_FAILURE(Do("run", "euroc_v101_keyframes", {"--no-certificate", "--no-report"}));
+  ExpectOneMinimumFromThreeStarts();
 }
 
 TEST_F(SharedData, SevenScenesKitchen) {

@@ -141,7 +141,7 @@ TEST_F(SolveTest, AveragesRelativeRotations) {
 
 TEST_F(SolveTest, TakesTheStartThatIsAskedForAndLeavesTheCertificateOut) {
   WriteColmapText(Path("model"), Street());
-  for (const char* start : {"l1", "bisection", "linear"}) {
+  for (const char* start : {"l1", "bisection", "positioning"}) {
     const CommandResult result =
         Rotslam({"solve", Path("model").string(), "--out", Path(start).string(), "--krot", start});
     ASSERT_EQ(result.exit_code, 0) << result.error;

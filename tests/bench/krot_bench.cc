@@ -129,8 +129,7 @@ void Measure(const std::string& name, const SceneOptions& scene, const Limits& l
 int MeasureAll(const std::vector<std::pair<int, int>>& sizes, bool with_orbit) {
   PrintHeader();
   for (const auto& [num_views, num_points] : sizes) {
-    const std::uint64_t num_seeds = num_points > 50000 ? 2 : 5;
-    for (std::uint64_t seed = 1; seed <= num_seeds; ++seed) {
+    for (std::uint64_t seed = 1; seed <= 5; ++seed) {
       const Limits limits = seed == 1 ? Limits{} : Limits{0, 0};
       Measure(std::to_string(num_views) + "x" + std::to_string(num_points) + " #" +
                   std::to_string(seed),

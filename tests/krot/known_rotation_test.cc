@@ -35,7 +35,7 @@ CenterError ErrorOf(const KrotSolution& solution, const Scene& scene) {
 
 TEST(SolveKnownRotation, FindsTheTruthOnCleanScenes) {
   for (const ScenePath path : {ScenePath::kRing, ScenePath::kRandom, ScenePath::kStreet}) {
-    for (const char* start : {"l1", "bisection"}) {
+    for (const char* start : {"l1", "bisection", "positioning"}) {
       SceneOptions scene_options = Street(10, 200);
       scene_options.path = path;
       const Scene scene = MakeScene(scene_options);
@@ -114,19 +114,23 @@ TEST(SolveKnownRotation, TenPercentOutliersAreRemovedAndChangeLittle) {
   scene_options.rotation_noise_deg = 0.03;
   scene_options.outlier_ratio = 0.1;
   const Scene scene = MakeScene(scene_options);
-  const KrotSolution solution = Solve(scene);
-  ASSERT_TRUE(solution.Usable()) << solution.message;
-  int caught = 0;
-  for (const RemovedObservation& removed : solution.removed) {
-    caught += scene.outliers.contains({removed.track, removed.frame});
-  }
   int num_observations = 0;
   for (const Track& track : scene.tracks) {
     num_observations += static_cast<int>(track.observations.size());
   }
-  EXPECT_GT(caught, 0.95 * static_cast<double>(scene.outliers.size()));
-  EXPECT_LT(static_cast<double>(solution.removed.size()) - caught, 0.02 * num_observations);
-  EXPECT_LT(ErrorOf(solution, scene).max, 1.0);
+  for (const char* start : {"l1", "positioning"}) {
+    KrotOptions options;
+    options.start = start;
+    const KrotSolution solution = Solve(scene, options);
+    ASSERT_TRUE(solution.Usable()) << solution.message;
+    int caught = 0;
+    for (const RemovedObservation& removed : solution.removed) {
+      caught += scene.outliers.contains({removed.track, removed.frame});
+    }
+    EXPECT_GT(caught, 0.95 * static_cast<double>(scene.outliers.size())) << start;
+    EXPECT_LT(static_cast<double>(solution.removed.size()) - caught, 0.02 * num_observations);
+    EXPECT_LT(ErrorOf(solution, scene).max, 1.0) << start;
+  }
 }
 
 TEST(SolveKnownRotation, BracketCoversWhatItKeepsAndNamesWhatHoldsIt) {

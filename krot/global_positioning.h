@@ -1,0 +1,27 @@
+#pragma once
+
+#include <optional>
+
+#include "krot/minimax_problem.h"
+
+namespace rotslam {
+
+/// Centres and points whose rays are nearest to what was seen, whatever their depths: the least sum
+/// of |v - s (X - c)| over the observations, v the ray and s > 0 one over the depth, squared below
+/// `loss_rad` and linear above. Starts from all depths equal, so it needs no first structure, and
+/// shares nothing with the linear programs.
+/// @param problem   may hold outliers, a tenth and more; holds nothing fixed
+/// (std::invalid_argument).
+/// @param loss_rad  an outlier's least angle off its ray.
+/// @return  nullopt for fewer than two views, or where no system can be solved. First centre at the
+///          origin, scale free.
+/// Error:   truth to 1e-6 of the scene's size on clean scenes.
+/// Cost:    30 to 100 factorisations of the centres' system (StructureSystem).
+/// Source:  Zhuang, Cheong & Lee, Baseline Desensitizing in Translation Averaging, CVPR 2018; Pan
+///          et al., Global Structure-from-Motion Revisited, ECCV 2024. Ours has no random start,
+///          eliminates the depths, and damps nothing but them: then each step lies between the
+///          answer for depths as they are and Gauss and Newton's, neither of which sees the scale.
+std::optional<MinimaxStructure> SolveGlobalPositioning(const MinimaxProblem& problem,
+                                                       double loss_rad);
+
+}  // namespace rotslam
