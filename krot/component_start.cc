@@ -142,7 +142,8 @@ std::optional<ComponentStart> StartComponent(const RotationMap& cam_from_world,
                                              const KrotUnits& units) {
   const std::set<FrameId> members(component.views.begin(), component.views.end());
   std::optional<ComponentStart> start =
-      component.views.size() <= static_cast<std::size_t>(options.max_lp_views)
+      options.start == "positioning" ||
+              component.views.size() <= static_cast<std::size_t>(options.max_lp_views)
           ? SolveSelected(cam_from_world, TracksOf(members, tracks, units.min_z), options, units)
           : SolveInBlocks(cam_from_world, tracks, component, component_options, options, units);
   if (!start || start->centers.size() == component.views.size()) return start;

@@ -17,9 +17,9 @@ struct ComponentStart {
   int num_grown_views = 0;  // placed by resection
 };
 
-/// Solves the robust start's programs, or global positioning with options.start "positioning", over
-/// a spread of tracks, in blocks of views where there are more than options.max_lp_views, and
-/// places the views that they leave out, by resection.
+/// Solves the robust start's programs over a spread of tracks, in blocks of views where there are
+/// more than options.max_lp_views, or global positioning over all with options.start "positioning",
+/// and places the views that they leave out, by resection.
 /// @param tracks             clean: finite unit bearings, frames ascending.
 /// @param component_options  what the component was found with, to find its blocks.
 /// @return  nullopt when that gives no structure.

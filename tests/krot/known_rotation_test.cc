@@ -207,6 +207,14 @@ TEST(SolveKnownRotation, SolvesInBlocksWhatIsLongerThanOneProgram) {
   EXPECT_EQ(solution.center_in_world.size(), 40u);
   EXPECT_EQ(solution.num_grown_views, 0);
   EXPECT_LT(ErrorOf(solution, scene).max, 3.0 * whole);
+  // Without programs there are no blocks.
+  options.start = "positioning";
+  options.use_bracket = false;
+  const KrotSolution positioned = Solve(scene, options);
+  EXPECT_EQ(positioned.center_in_world.size(), 40u);
+  EXPECT_EQ(positioned.num_programs, 0);
+  options.max_lp_views = 100;
+  EXPECT_EQ(Solve(scene, options).center_in_world, positioned.center_in_world);
 }
 
 TEST(SolveKnownRotation, RelabellingViewsChangesNothing) {
