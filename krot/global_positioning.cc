@@ -16,7 +16,7 @@ constexpr double kFirstLossRad = 0.1;
 constexpr int kMaxSteps = 200;
 // A loss has done its work after so many steps that gain less than this share of the cost. It takes
 // small ones to move long chains: with 1e-3 the positions along a street with one outlier in three
-// are ten times as far off.
+// are twenty times as far off.
 constexpr double kLeastGain = 1e-5;
 constexpr int kSmallGains = 3;
 // Damping of the depths, in units of their own curvature.

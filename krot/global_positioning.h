@@ -15,8 +15,11 @@ namespace rotslam {
 /// @param loss_rad  an outlier's least angle off its ray.
 /// @return  nullopt for fewer than two views, or where no system can be solved. First centre at the
 ///          origin, scale free.
-/// Error:   truth to 1e-6 of the scene's size on clean scenes.
-/// Cost:    30 to 100 factorisations of the centres' system (StructureSystem).
+/// Error:   truth to 1e-6 of the scene's size on clean scenes; 0.02 m over a street of 30 m with
+///          0.7 px of noise, 0.03 deg of rotation error and one outlier in three. Along ways that
+///          do not close on themselves the scale shrinks with the rotations' error: at 0.1 deg to
+///          half over 150 views.
+/// Cost:    30 to 200 factorisations of the centres' system (StructureSystem).
 /// Source:  Zhuang, Cheong & Lee, Baseline Desensitizing in Translation Averaging, CVPR 2018; Pan
 ///          et al., Global Structure-from-Motion Revisited, ECCV 2024. Ours has no random start,
 ///          eliminates the depths, and damps nothing but them: then each step lies between the
