@@ -141,11 +141,13 @@ std::optional<ComponentStart> StartComponent(const RotationMap& cam_from_world,
                                              const KrotOptions& options,
                                              const KrotUnits& units) {
   const std::set<FrameId> members(component.views.begin(), component.views.end());
+  // Programs alone take more than their length by being long.
+  const bool by_blocks = options.start != "positioning" &&
+                         component.views.size() > static_cast<std::size_t>(options.max_lp_views);
   std::optional<ComponentStart> start =
-      options.start == "positioning" ||
-              component.views.size() <= static_cast<std::size_t>(options.max_lp_views)
-          ? SolveSelected(cam_from_world, TracksOf(members, tracks, units.min_z), options, units)
-          : SolveInBlocks(cam_from_world, tracks, component, component_options, options, units);
+      by_blocks
+          ? SolveInBlocks(cam_from_world, tracks, component, component_options, options, units)
+          : SolveSelected(cam_from_world, TracksOf(members, tracks, units.min_z), options, units);
   if (!start || start->centers.size() == component.views.size()) return start;
   GrowthOptions growth;
   growth.resection.threshold_rad = units.loose_rad;

@@ -28,9 +28,8 @@ constexpr double kMaxDepthFactor = 10.0;
 
 class GlobalPositioning {
  public:
-  GlobalPositioning(const MinimaxProblem& problem, double loss_rad)
+  explicit GlobalPositioning(const MinimaxProblem& problem)
       : problem_(problem),
-        last_loss_(loss_rad),
         system_(problem),
         layout_{problem.num_views(), problem.num_points},
         inverse_depths_(problem.observations.size(), 1.0),
@@ -42,9 +41,9 @@ class GlobalPositioning {
     }
   }
 
-  std::optional<MinimaxStructure> Solve() {
+  std::optional<MinimaxStructure> Solve(double loss_rad) {
     if (!StartFromEqualDepths()) return std::nullopt;
-    for (const double loss : {std::max(kFirstLossRad, last_loss_), last_loss_}) {
+    for (const double loss : {std::max(kFirstLossRad, loss_rad), loss_rad}) {
       loss_ = loss;
       if (!Minimise()) return std::nullopt;
     }
@@ -183,8 +182,7 @@ class GlobalPositioning {
   }
 
   const MinimaxProblem& problem_;
-  double loss_ = 0.0;
-  double last_loss_;
+  double loss_ = 0.0;  // at present
   StructureSystem system_;
   StructureLayout layout_;
   std::vector<Eigen::Vector3d> rays_;   // unit, world axes, by observation
@@ -203,7 +201,7 @@ std::optional<MinimaxStructure> SolveGlobalPositioning(const MinimaxProblem& pro
     throw std::invalid_argument("global positioning: nothing can be held fixed");
   }
   if (problem.num_views() < 2) return std::nullopt;
-  return GlobalPositioning(problem, loss_rad).Solve();
+  return GlobalPositioning(problem).Solve(loss_rad);
 }
 
 }  // namespace rotslam
