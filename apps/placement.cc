@@ -1,5 +1,6 @@
 #include "apps/placement.h"
 
+#include <algorithm>
 #include <iterator>
 #include <map>
 #include <optional>
@@ -47,7 +48,7 @@ std::map<FrameId, ResectedPose> ResectFrames(const std::map<FrameId, ResectionSt
       const auto seen_from = place.find(observation.frame);
       if (seen_from == place.end()) continue;
       frames[seen_from->second].sightings.push_back(
-          {point->second, observation.keypoint_px, observation.sigma_px});
+          {point->second, observation.keypoint_px, observation.sigma_px, observation.smear});
     }
   }
   ParallelFor(static_cast<int>(frames.size()), num_threads, [&](int k) {
@@ -94,8 +95,12 @@ void PlaceRemainingFrames(const Orientations& orientations,
     const auto covariance = rotation_covariance.find(frame);
     if (covariance != rotation_covariance.end()) start.rotation_covariance = covariance->second;
   }
+  ResectionOptions resection = options.resection;
+  resection.has_smears = std::any_of(result.bundles.begin(),
+                                     result.bundles.end(),
+                                     [](const BundleSummary& bundle) { return bundle.has_smears; });
   const std::map<FrameId, ResectedPose> poses = ResectFrames(
-      starts, result.map.point_in_world, all_tracks, result.camera, options.resection, num_threads);
+      starts, result.map.point_in_world, all_tracks, result.camera, resection, num_threads);
   for (const auto& [frame, pose] : poses) {
     result.cam_from_world[frame] = pose.cam_from_world;
     result.center_in_world[frame] = pose.center_in_world;

@@ -16,6 +16,7 @@
 #include "output/cloud_outliers.h"
 #include "rotodom/averaging/anchors.h"
 #include "rotodom/completion/completion.h"
+#include "rotodom/tracking/smear.h"
 
 namespace rotslam {
 namespace {
@@ -123,9 +124,18 @@ PositionResult TurningInPlace(const PositionResult& moving,
   return WithoutMap(std::move(result), {});
 }
 
-std::vector<Track> TracksOf(const Orientations& orientations) {
-  return BuildTracks(
+TurningRates RatesOf(const Orientations& orientations) {
+  return RatesOf(orientations.cam_from_world,
+                 [&](FrameId frame) { return orientations.timestamps_s[frame.value]; });
+}
+
+std::vector<Track> TracksOf(const Orientations& orientations,
+                            const Camera& camera,
+                            double smear_s_per_px) {
+  std::vector<Track> tracks = BuildTracks(
       orientations.edge_matches, orientations.features, AllFrames(orientations.cam_from_world), 2);
+  SetSmears(camera, RatesOf(orientations), smear_s_per_px, tracks);
+  return tracks;
 }
 
 // Reads images of frames of the map again.
@@ -153,13 +163,17 @@ ViewReader ReaderOf(const Input& input,
 // Completes tracks with the images of the map's frames; null where that is not asked for.
 // @param read  may be null.
 TrackCompletion CompletionWith(const ViewReader& read,
-                               const CompletionOptions& options,
+                               const Orientations& orientations,
+                               const PipelineOptions& options,
                                int num_threads) {
-  if (!options.enabled || !read) return nullptr;
+  if (!options.completion.enabled || !read) return nullptr;
   return [&, num_threads](const Reconstruction& map, const Camera& camera) {
     std::set<FrameId> frames;
     for (const auto& [frame, center] : map.center_in_world) frames.insert(frame);
-    return CompleteTracks(map, read(map, frames), camera, options, num_threads);
+    std::vector<Track> tracks =
+        CompleteTracks(map, read(map, frames), camera, options.completion, num_threads);
+    SetSmears(camera, RatesOf(orientations), options.ba.smear_s_per_px, tracks);
+    return tracks;
   };
 }
 
@@ -283,7 +297,7 @@ PositionResult MapKeyframes(const Orientations& orientations,
   }
 
   progress.StartStage("bundle adjustment", -1);
-  const TrackCompletion complete = CompletionWith(read, options.completion, num_threads);
+  const TrackCompletion complete = CompletionWith(read, orientations, options, num_threads);
   RefinedComponents refined = RefineComponents(
       keyframe_rotations, result.krot, tracks, result.held, camera, bundle_options, complete);
   if (options.relocalisation.enabled) {
@@ -353,8 +367,13 @@ PositionResult FindKeyframePositions(const Orientations& orientations,
                                      int num_threads,
                                      Progress& progress) {
   progress.StartStage("tracks", -1);
-  return MapKeyframes(
-      orientations, TracksOf(orientations), camera, nullptr, options, num_threads, progress);
+  return MapKeyframes(orientations,
+                      TracksOf(orientations, camera, options.ba.smear_s_per_px),
+                      camera,
+                      nullptr,
+                      options,
+                      num_threads,
+                      progress);
 }
 
 PositionResult FindPositions(const Input& input,
@@ -363,7 +382,7 @@ PositionResult FindPositions(const Input& input,
                              int num_threads,
                              Progress& progress) {
   progress.StartStage("tracks", -1);
-  std::vector<Track> all_tracks = TracksOf(orientations);
+  std::vector<Track> all_tracks = TracksOf(orientations, input.camera, options.ba.smear_s_per_px);
   PositionResult result =
       MapKeyframes(orientations,
                    all_tracks,

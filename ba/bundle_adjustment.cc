@@ -56,6 +56,7 @@ BundleState WithSomeTracks(const BundleState& state, int num_wanted) {
   }
   BundleState part;
   part.camera = state.camera;
+  part.has_smears = state.has_smears;
   part.frames = state.frames;
   part.centers = state.centers;
   for (std::size_t t = 0; t < state.tracks.size(); ++t) {
@@ -64,8 +65,9 @@ BundleState WithSomeTracks(const BundleState& state, int num_wanted) {
   return part;
 }
 
-// Takes the cameras over from a part.
+// Takes the cameras over from a part, and how its observations are weighed.
 void TakeCameras(const BundleState& part, BundleState& state) {
+  state.has_smears = part.has_smears;
   state.frames = part.frames;
   state.centers = part.centers;
   if (part.camera != state.camera) SetCamera(part.camera, state);
@@ -107,7 +109,7 @@ class Rounds {
     };
     BundleRound round = options_.fine;
     round.loss_scale = narrow(options_.loss_spreads, round.loss_scale);
-    round.max_error_px = narrow(options_.limit_spreads, round.max_error_px);
+    round.max_residual = narrow(options_.limit_spreads, round.max_error_px);
     return round;
   }
 
@@ -115,7 +117,7 @@ class Rounds {
   // @return  the fine round for what it leaves.
   BundleRound Narrow(BundleState& state) {
     BundleRound round = FineFor(state);
-    if (round.loss_scale < last_.loss_scale || round.max_error_px < last_.max_error_px) {
+    if (round.loss_scale < last_.loss_scale || round.max_residual < last_.max_residual) {
       Run("narrow", round, state);
       round = FineFor(state);
     }
@@ -344,6 +346,7 @@ BundleResult RefineBundle(const BundleProblem& problem,
   BundleState& preparing = part ? *part : state;
   rounds.Run("bridge", options.bridge, preparing);
   rounds.Run("coarse", options.coarse, preparing);
+  preparing.has_smears = ShowsSmears(preparing);
   rounds.TryLens(options.coarse, preparing);
   rounds.Run("fine", rounds.FineFor(preparing), preparing);
   // What support is asked of.
@@ -377,6 +380,7 @@ BundleResult RefineBundle(const BundleProblem& problem,
     summary.support = SupportWithin(options.fine, options, given ? *given : state);
     ClassifyAll(rounds.last(), Placement::kStays, options, state);
     summary.after = Statistics(state);
+    summary.has_smears = state.has_smears;
     rounds.FindCovariances(options.fine, state);
     TakeResult(problem, state, result);
     result.message = summary.rounds.back().termination;

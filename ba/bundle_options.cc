@@ -5,6 +5,7 @@
 namespace rotslam {
 std::optional<std::string> BundleRound::Problem() const {
   if (!(max_error_px >= 0.0)) return OutOfRange("max_error_px", max_error_px, "at least 0");
+  if (!(max_residual >= 0.0)) return OutOfRange("max_residual", max_residual, "at least 0");
   if (loss != "huber" && loss != "cauchy" && loss != "none") {
     return OutOfRange("loss", loss, "huber, cauchy or none");
   }
@@ -39,6 +40,7 @@ std::optional<std::string> BundleOptions::Problem() const {
   }
   if (!(loss_spreads >= 0.0)) return OutOfRange("loss_spreads", loss_spreads, "at least 0");
   if (!(limit_spreads >= 0.0)) return OutOfRange("limit_spreads", limit_spreads, "at least 0");
+  if (!(smear_s_per_px >= 0.0)) return OutOfRange("smear_s_per_px", smear_s_per_px, "at least 0");
   if (max_close_rounds < 1) {
     return OutOfRange("max_close_rounds", max_close_rounds, "at least 1");
   }

@@ -15,6 +15,9 @@ struct BundleRound {
   // Observations farther than this from their point, as the cameras stand before the round, are
   // left out of it. For keypoints with sigma_px above 1 it grows with sigma_px. Zero: nothing is.
   double max_error_px = 0.0;
+  // So are those whose residual, in sigmas, is above this; where sigma_px is below 1, in pixels.
+  // Zero: no residual is.
+  double max_residual = 0.0;
   // "huber", "cauchy" or "none".
   std::string loss = "huber";
   // Residual, in sigmas, at which the loss leaves the quadratic.
@@ -34,6 +37,7 @@ struct BundleRound {
     visit("enabled", enabled);
     visit("refine_rotations", refine_rotations);
     visit("max_error_px", max_error_px);
+    visit("max_residual", max_residual);
     visit("loss", loss);
     visit("loss_scale", loss_scale);
     visit("max_iterations", max_iterations);
@@ -110,6 +114,12 @@ struct BundleOptions {
   // 1.4 % off the cost of KITTI 00, with 2 and 6 spreads 3.8 %. 0: as the round has it.
   double loss_spreads = 3.0;
   double limit_spreads = 5.0;
+  // While a frame is exposed it turns, and what it sees is smeared along the motion: there its
+  // keypoints are less certain than across, by hypot(1, smear), which is this times the speed of
+  // the image, px/s. Where the coarse round's residuals clearly show that it counts from then on.
+  // Most likely by those of TUM fr1_rpy: 0.002, up to a smear of 1.4. 0: as certain in all
+  // directions.
+  double smear_s_per_px = 0.002;
   // Closing is repeated, so many times at most, until classification changes less than this share
   // of the observations: then the result does not depend on where it started.
   int max_close_rounds = 5;
@@ -151,6 +161,7 @@ struct BundleOptions {
     visit("preparing_observations", preparing_observations);
     visit("loss_spreads", loss_spreads);
     visit("limit_spreads", limit_spreads);
+    visit("smear_s_per_px", smear_s_per_px);
     visit("max_close_rounds", max_close_rounds);
     visit("max_changed_share", max_changed_share);
     visit("refine_rotations", refine_rotations);

@@ -152,6 +152,12 @@ void ReplaceTracks(std::vector<Track> tracks, BundleState& state) {
   SetCamera(state.camera, state);
 }
 
+Eigen::Matrix2d ScaleOf(const BundleState& state, const Sight& sight) {
+  const Observation& observation = *sight.observation;
+  if (!state.has_smears) return Eigen::Matrix2d::Identity() / observation.sigma_px;
+  return Unsmearing(observation.smear) / observation.sigma_px;
+}
+
 void SetCamera(const Camera& camera, BundleState& state) {
   state.camera = camera;
   for (TrackState& track : state.tracks) {

@@ -46,6 +46,8 @@ struct BundleState {
   std::vector<FrameState> frames;
   std::vector<Eigen::Vector3d> centers;
   std::vector<TrackState> tracks;
+  // Whether keypoints are less certain along their smears.
+  bool has_smears = false;
   // Where tracks are that are not the problem's any more.
   std::shared_ptr<const std::vector<Track>> replaced;
 };
@@ -57,6 +59,9 @@ BundleState MakeBundleState(const BundleProblem& problem, const BundleOptions& o
 
 /// Replaces those of the state's tracks that have the ids of `tracks`. Where they are stays.
 void ReplaceTracks(std::vector<Track> tracks, BundleState& state);
+
+/// Sigmas per pixel: the inverse root of the keypoint's covariance.
+Eigen::Matrix2d ScaleOf(const BundleState& state, const Sight& sight);
 
 /// Replaces the camera, and the bearings with it.
 void SetCamera(const Camera& camera, BundleState& state);

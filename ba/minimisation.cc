@@ -348,7 +348,7 @@ class Minimisation {
                         cameras_.RotationOf(sight.frame),
                         shift,
                         observation.keypoint_px,
-                        observation.sigma_px,
+                        ScaleOf(state_, sight),
                         huber_bend_,
                         form);
     std::array<double*, 4> blocks;

@@ -111,7 +111,7 @@ ReprojectionCost::ReprojectionCost(const Camera& camera,
                                    const TurnedRotation& rotation,
                                    const PointShift& shift,
                                    const Eigen::Vector2d& keypoint_px,
-                                   double sigma_px,
+                                   const Eigen::Matrix2d& scale,
                                    double huber_bend,
                                    const ObservationForm& form)
     : camera_(camera),
@@ -119,7 +119,7 @@ ReprojectionCost::ReprojectionCost(const Camera& camera,
       rotation_(rotation),
       shift_(shift),
       keypoint_px_(keypoint_px),
-      sigma_px_(sigma_px),
+      scale_(scale),
       huber_bend_(huber_bend),
       form_(form) {
   set_num_residuals(2);
@@ -152,12 +152,12 @@ bool ReprojectionCost::Evaluate(double const* const* parameters,
     J.by_center.setZero();
     J.by_point.setZero();
   }
-  const RobustResidual robust =
-      UnderHuberLoss(pixel ? Eigen::Vector2d((*pixel - keypoint_px_) / sigma_px_)
-                           : Eigen::Vector2d::Constant(kUnseenResidual_px / sigma_px_),
-                     huber_bend_);
+  const RobustResidual robust = UnderHuberLoss(
+      pixel ? Eigen::Vector2d(scale_ * (*pixel - keypoint_px_))
+            : Eigen::Vector2d(scale_ * Eigen::Vector2d::Constant(kUnseenResidual_px)),
+      huber_bend_);
   Eigen::Vector2d::Map(residuals) = robust.value;
-  const Eigen::Matrix2d weight = robust.weight / sigma_px_;
+  const Eigen::Matrix2d weight = robust.weight * scale_;
   if (blocks.J_turn != nullptr) {
     const Eigen::Matrix<double, 2, 3> J_turn = J.by_rotation * rotation_.Jacobian();
     ColumnsOf<3>(blocks.J_turn, blocks.camera_stride).noalias() = weight * J_turn;

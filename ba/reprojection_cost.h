@@ -85,7 +85,7 @@ struct PointShift {
   bool lost = false;  // not to be seen from anywhere
 };
 
-/// (Project(R_c_w (point + shift - center)) - keypoint_px) / sigma_px, under Huber's loss: see
+/// scale (Project(R_c_w (point + shift - center)) - keypoint_px), under Huber's loss: see
 /// UnderHuberLoss. Its derivatives are what steps are taken with, exact up to the loss' bend.
 class ReprojectionCost final : public ceres::CostFunction {
  public:
@@ -94,6 +94,7 @@ class ReprojectionCost final : public ceres::CostFunction {
   ///                    ceres::EvaluationCallback).
   /// @param calibrated  what LensParameters refer to.
   /// @param shift       of the point.
+  /// @param scale       sigmas per pixel: the inverse root of the keypoint's covariance.
   /// @param huber_bend  of Huber's loss, in sigmas; 0: no loss.
   /// The first four must outlive the cost function.
   ReprojectionCost(const Camera& camera,
@@ -101,7 +102,7 @@ class ReprojectionCost final : public ceres::CostFunction {
                    const TurnedRotation& rotation,
                    const PointShift& shift,
                    const Eigen::Vector2d& keypoint_px,
-                   double sigma_px,
+                   const Eigen::Matrix2d& scale,
                    double huber_bend = 0.0,
                    const ObservationForm& form = {});
   bool Evaluate(double const* const* parameters,
@@ -114,7 +115,7 @@ class ReprojectionCost final : public ceres::CostFunction {
   const TurnedRotation& rotation_;
   const PointShift& shift_;
   Eigen::Vector2d keypoint_px_;
-  double sigma_px_;
+  Eigen::Matrix2d scale_;
   double huber_bend_;
   ObservationForm form_;
 };

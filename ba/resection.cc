@@ -10,6 +10,7 @@
 #include "ba/reprojection_cost.h"
 #include "rotodom/types/median.h"
 #include "rotodom/types/options.h"
+#include "rotodom/types/track.h"
 
 namespace rotslam {
 namespace {
@@ -62,12 +63,18 @@ class Resection {
     if (start.rotation_covariance) prior_information_ = start.rotation_covariance->inverse();
   }
 
+  // Sigmas per pixel.
+  Eigen::Matrix2d ScaleOf(const PointSighting& sighting) const {
+    if (!options_.has_smears) return Eigen::Matrix2d::Identity() / sighting.sigma_px;
+    return Unsmearing(sighting.smear) / sighting.sigma_px;
+  }
+
   // Residual in sigmas; what does not project is far off.
   double Sigmas(const Pose& pose, const PointSighting& sighting) const {
     const auto pixel = Reproject(
         camera_, pose.cam_from_world.Matrix(), pose.center_in_world, sighting.point_in_world);
-    const double error_px = pixel ? (*pixel - sighting.keypoint_px).norm() : kUnseenResidual_px;
-    return error_px / sighting.sigma_px;
+    if (!pixel) return kUnseenResidual_px / sighting.sigma_px;
+    return (ScaleOf(sighting) * (*pixel - sighting.keypoint_px)).norm();
   }
 
   double MedianSigmas(const Pose& pose) const {
@@ -91,7 +98,7 @@ class Resection {
       const auto pixel =
           Reproject(camera_, R_c_w, pose.center_in_world, sighting.point_in_world, &J);
       const Eigen::Vector2d residual =
-          pixel ? Eigen::Vector2d((*pixel - sighting.keypoint_px) / sighting.sigma_px)
+          pixel ? Eigen::Vector2d(ScaleOf(sighting) * (*pixel - sighting.keypoint_px))
                 : Eigen::Vector2d::Constant(kUnseenResidual_px / sighting.sigma_px);
       const double squared = residual.squaredNorm();
       const double keep = scale == 0.0 ? 1.0 : scale * scale / (squared + scale * scale);
@@ -99,7 +106,7 @@ class Resection {
       if (!pixel) continue;
       Eigen::Matrix<double, 2, 6> J_pose;
       J_pose << J.by_rotation, J.by_center;
-      J_pose /= sighting.sigma_px;
+      J_pose = ScaleOf(sighting) * J_pose;
       const double weight = keep * keep;
       normal.H.noalias() += weight * J_pose.transpose() * J_pose;
       normal.g.noalias() += weight * J_pose.transpose() * residual;

@@ -1,11 +1,21 @@
 #include "rotodom/types/track.h"
 
+#include <cmath>
+
 namespace rotslam {
 
 int NumObservations(const std::vector<Track>& tracks) {
   std::size_t count = 0;
   for (const Track& track : tracks) count += track.observations.size();
   return static_cast<int>(count);
+}
+
+Eigen::Matrix2d Unsmearing(const Eigen::Vector2f& smear) {
+  const Eigen::Vector2d s = smear.cast<double>();
+  const double squared = s.squaredNorm();
+  if (squared == 0.0) return Eigen::Matrix2d::Identity();
+  return Eigen::Matrix2d::Identity() -
+         (1.0 - 1.0 / std::sqrt(1.0 + squared)) / squared * s * s.transpose();
 }
 
 }  // namespace rotslam

@@ -1,5 +1,6 @@
 #include "ba/bundle_adjustment.h"
 
+#include <cmath>
 #include <cstring>
 
 #include <gtest/gtest.h>
@@ -176,6 +177,49 @@ TEST(RefineBundle, HoldsDriftingTracksForWhatTheyAreWhereTheOthersAreClose) {
     if (track.id.value % 5 != 0) num_good += static_cast<int>(track.observations.size());
   }
   EXPECT_GT(num_kept, 0.98 * num_good);
+}
+
+TEST(RefineBundle, WeighsKeypointsLessAlongTheirSmear) {
+  // Frames turn about one axis after the other: their keypoints err by 0.2 px across and 0.6 along.
+  double error = 0.0;
+  double isotropic_error = 0.0;
+  for (const std::uint32_t seed : {1U, 2U, 3U}) {
+    BaScene scene = MakeBaScene({.seed = seed});
+    std::mt19937 random(seed);
+    std::normal_distribution<double> normal(0.0, 0.2);
+    for (Track& track : scene.truth.tracks) {
+      for (Observation& observation : track.observations) {
+        const double angle = 1.3 * observation.frame.value;
+        const Eigen::Vector2d along(std::cos(angle), std::sin(angle));
+        const Eigen::Vector2d across(-along.y(), along.x());
+        observation.keypoint_px += std::hypot(1.0, 3.0) * normal(random) * along;
+        observation.keypoint_px += normal(random) * across;
+        observation.bearing = *scene.camera.Unproject(observation.keypoint_px);
+        observation.smear = 3.0F * along.cast<float>();
+      }
+    }
+    BundleProblem problem = PerturbedProblem(scene, 0.1, 0.5);
+    const BundleResult weighed = RefineBundle(problem, {});
+    EXPECT_TRUE(weighed.summary.has_smears);
+    error += CenterError(weighed.reconstruction, scene.truth);
+    for (Track& track : problem.start.tracks) {
+      for (Observation& observation : track.observations) observation.smear.setZero();
+    }
+    isotropic_error += CenterError(RefineBundle(problem, {}).reconstruction, scene.truth);
+  }
+  EXPECT_LT(error, 0.8 * isotropic_error);
+}
+
+TEST(RefineBundle, LeavesSmearsThatKeypointsDoNotShow) {
+  BaScene scene = MakeBaScene({.noise_px = 0.3});
+  BundleProblem problem = PerturbedProblem(scene, 0.1, 0.5);
+  const BundleResult plain = RefineBundle(problem, {});
+  for (Track& track : problem.start.tracks) {
+    for (Observation& observation : track.observations) observation.smear = {1.2F, 0.5F};
+  }
+  const BundleResult smeared = RefineBundle(problem, {});
+  EXPECT_FALSE(smeared.summary.has_smears);
+  EXPECT_EQ(smeared.summary.final_cost, plain.summary.final_cost);
 }
 
 TEST(RefineBundle, ForgetsTheNamesOfFramesAndTracks) {

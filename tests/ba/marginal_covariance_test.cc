@@ -37,7 +37,7 @@ class StreetProblem {
                             rotations_[observation.frame.value],
                             no_shift_,
                             observation.keypoint_px,
-                            observation.sigma_px);
+                            Eigen::Matrix2d::Identity() / observation.sigma_px);
         problem_.AddResidualBlock(
             &costs_.back(), &loss_, poses_[observation.frame.value].data(), point);
       }

@@ -83,7 +83,8 @@ const Rotation kStart = Rotation::Exp({0.3, -0.2, 0.1});
 const Eigen::Vector2d kKeypoint_px(600.0, 200.0);
 // Added to the point: nothing.
 const PointShift kShift;
-constexpr double kSigma_px = 0.7;
+// As certain along (0.6, -1.1) as the smear there leaves it.
+const Eigen::Matrix2d kScale = Unsmearing({0.6F, -1.1F}) / 0.7;
 
 // A reprojection cost that keeps rotation and lens as its parameters say.
 class FollowingCost final : public ceres::CostFunction {
@@ -93,7 +94,7 @@ class FollowingCost final : public ceres::CostFunction {
         camera_(calibrated),
         rotation_(kStart),
         form_(form),
-        cost_(camera_, calibrated_, rotation_, kShift, kKeypoint_px, kSigma_px, 0.0, form) {
+        cost_(camera_, calibrated_, rotation_, kShift, kKeypoint_px, kScale, 0.0, form) {
     set_num_residuals(cost_.num_residuals());
     *mutable_parameter_block_sizes() = cost_.parameter_block_sizes();
   }
@@ -154,7 +155,7 @@ struct AutomaticReprojection {
   Camera camera;
   Eigen::Matrix3d start;
   Eigen::Vector2d keypoint_px;
-  double sigma_px;
+  Eigen::Matrix2d scale;
 
   template <typename T>
   bool operator()(const T* pose, const T* point, T* residuals) const {
@@ -180,8 +181,9 @@ struct AutomaticReprojection {
       y = y * radial + d[2] * (r2 + 2.0 * y * y) + 2.0 * d[3] * x * y;
       x = x_bent;
     }
-    residuals[0] = (camera.fx * x + camera.cx - keypoint_px.x()) / sigma_px;
-    residuals[1] = (camera.fy * y + camera.cy - keypoint_px.y()) / sigma_px;
+    const Eigen::Vector<T, 2> offset_px(camera.fx * x + camera.cx - keypoint_px.x(),
+                                        camera.fy * y + camera.cy - keypoint_px.y());
+    Eigen::Vector<T, 2>::Map(residuals) = scale.cast<T>() * offset_px;
     return true;
   }
 };
@@ -190,7 +192,7 @@ TEST_P(ReprojectionForEveryCamera, JacobiansEqualAutomaticDerivatives) {
   const Camera camera = BaCamera(GetParam());
   const FollowingCost ours(camera, {});
   const ceres::AutoDiffCostFunction<AutomaticReprojection, 2, 6, 3> automatic(
-      new AutomaticReprojection{camera, kStart.Matrix(), kKeypoint_px, kSigma_px});
+      new AutomaticReprojection{camera, kStart.Matrix(), kKeypoint_px, kScale});
   Eigen::Vector<double, 6> pose;
   pose << 0.02, -0.15, 0.1, 0.4, -0.3, 0.2;
   const Eigen::Vector3d point(1.1, -0.7, 4.0);
@@ -280,7 +282,7 @@ TEST(ReprojectionCost, PointBehindTheCameraOrLostCostsButDoesNotPull) {
                                 rotation,
                                 shift,
                                 {600.0, 200.0},
-                                2.0,
+                                0.5 * Eigen::Matrix2d::Identity(),
                                 0.0,
                                 {.camera = CameraLayout::kApart});
     const double turn[3] = {0.0, 0.0, 0.0};

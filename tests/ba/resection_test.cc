@@ -73,6 +73,34 @@ TEST(ResectFrame, CovarianceTellsTheErrorToExpect) {
   EXPECT_NEAR(sum / 100.0, 6.0, 1.2);  // standard deviation of the mean is 0.35
 }
 
+TEST(ResectFrame, CovarianceCountsWhatIsSmeared) {
+  SeenPoints view = MakeView(CameraModel::kPinhole, 200, 0.0, 0.0);
+  const std::vector<PointSighting> clean = view.sightings;
+  std::mt19937 random(3);
+  std::normal_distribution<double> normal(0.0, 0.5);
+  double sum = 0.0;
+  for (int draw = 0; draw < 100; ++draw) {
+    view.sightings = clean;
+    for (std::size_t k = 0; k < clean.size(); ++k) {
+      PointSighting& sighting = view.sightings[k];
+      const double angle = 0.1 * static_cast<double>(k);
+      const Eigen::Vector2d along(std::cos(angle), std::sin(angle));
+      sighting.smear = 3.0F * along.cast<float>();
+      sighting.sigma_px = 0.5;
+      sighting.keypoint_px += Eigen::Vector2d(normal(random), normal(random));
+      sighting.keypoint_px += 3.0 * normal(random) * along;
+    }
+    const auto pose = ResectFrame(view.camera,
+                                  view.sightings,
+                                  NearStart(view, 0.5, 0.2),
+                                  {.has_smears = true, .loss_scale = 20.0});
+    ASSERT_TRUE(pose);
+    EXPECT_EQ(pose->num_inliers, 200);
+    sum += SquaredMahalanobis(*pose, view);
+  }
+  EXPECT_NEAR(sum / 100.0, 6.0, 1.2);
+}
+
 TEST(ResectFrame, HoldsWhatItIsToldTo) {
   const SeenPoints view = MakeView(CameraModel::kPinhole, 100, 0.0, 0.0);
   ResectionStart start = NearStart(view, 0.0, 0.8);
