@@ -13,7 +13,7 @@
 namespace rotslam {
 namespace {
 
-constexpr std::string_view kMagic = "rotslam_map 3\n";
+constexpr std::string_view kMagic = "rotslam_map 2\n";
 constexpr double kMaxOwnNormError = 1e-6;
 
 void PutRotation(BinaryWriter& writer, const Rotation& rotation) {
@@ -94,8 +94,6 @@ void PutTrack(BinaryWriter& writer, const MapTrack& entry) {
     writer.Put(static_cast<float>(observation.keypoint_px.x()));
     writer.Put(static_cast<float>(observation.keypoint_px.y()));
     writer.Put(static_cast<float>(observation.sigma_px));
-    writer.Put(observation.smear.x());
-    writer.Put(observation.smear.y());
     writer.Put(static_cast<std::uint8_t>(entry.fits[k]));
     writer.Put(entry.levels[k]);
   }
@@ -111,7 +109,7 @@ MapTrack GetTrack(BinaryReader& reader,
   const std::string who = "track " + std::to_string(track.id.value);
   for (std::uint8_t& value : track.rgb) value = reader.Get<std::uint8_t>();
   if (reader.Get<std::uint8_t>() != 0) entry.point_in_world = GetPosition(reader, "a point");
-  const auto count = reader.Count("observations", 26);
+  const auto count = reader.Count("observations", 18);
   track.observations.reserve(count);
   entry.fits.reserve(count);
   entry.levels.reserve(count);
@@ -121,14 +119,11 @@ MapTrack GetTrack(BinaryReader& reader,
     observation.keypoint_px.x() = reader.Get<float>();
     observation.keypoint_px.y() = reader.Get<float>();
     observation.sigma_px = reader.Get<float>();
-    observation.smear.x() = reader.Get<float>();
-    observation.smear.y() = reader.Get<float>();
     const bool fits = reader.Get<std::uint8_t>() != 0;
     const auto level = reader.Get<std::uint8_t>();
     if (level >= num_levels) reader.Fail(who + ": a level is beyond the pyramid");
     if (!observation.keypoint_px.allFinite()) reader.Fail(who + ": a keypoint is not finite");
     if (!(observation.sigma_px > 0.0)) reader.Fail(who + ": a sigma is not positive");
-    if (!observation.smear.allFinite()) reader.Fail(who + ": a smear is not finite");
     if (!frames.contains(observation.frame)) {
       reader.Fail(who + " names frame " + std::to_string(observation.frame.value) +
                   ", which there is not");

@@ -20,9 +20,6 @@ TEST(RunMap, ReadsBackWhatItHasWritten) {
   RunMap map = MapOfScene(ExportScene());
   map.camera.readout_s = 0.02;
   map.camera.readout_from = ReadoutStart::kRight;
-  for (MapTrack& entry : map.tracks) {
-    for (Observation& observation : entry.track.observations) observation.smear = {0.25F, -3.5F};
-  }
   WriteRunMap(folder.path() / "map.bin", map);
   const RunMap read = ReadRunMap(folder.path() / "map.bin");
   EXPECT_EQ(read.camera, map.camera);
@@ -53,7 +50,6 @@ TEST(RunMap, ReadsBackWhatItHasWritten) {
       EXPECT_EQ(seen.keypoint_px, expected.track.observations[k].keypoint_px);
       EXPECT_EQ(seen.bearing, expected.track.observations[k].bearing);
       EXPECT_EQ(seen.sigma_px, expected.track.observations[k].sigma_px);
-      EXPECT_EQ(seen.smear, expected.track.observations[k].smear);
     }
   }
   ASSERT_EQ(read.edges.size(), map.edges.size());
