@@ -109,7 +109,8 @@ class Rounds {
     };
     BundleRound round = options_.fine;
     round.loss_scale = narrow(options_.loss_spreads, round.loss_scale);
-    round.max_residual = narrow(options_.limit_spreads, round.max_error_px);
+    const double limit = round.max_residual > 0.0 ? round.max_residual : round.max_error_px;
+    round.max_residual = narrow(options_.limit_spreads, limit);
     return round;
   }
 

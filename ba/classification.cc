@@ -358,7 +358,7 @@ double ResidualSpread(const BundleState& state) {
 
 bool ShowsSmears(const BundleState& state) {
   // In nats for each observation. TUM fr1_rpy and parts of it 0.024 to 0.10, the 7-Scenes kitchen
-  // and KITTI 00 0.002, where nothing is gained, rendered walks -0.06 to 0.006.
+  // and KITTI 00 0.002, where nothing is gained, sharp renderings -0.06 to 0.006.
   constexpr double kLeastEvidence = 0.015;
   // Shorter ones say nothing.
   constexpr double kLeastSmear = 0.05;
