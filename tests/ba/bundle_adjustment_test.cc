@@ -222,6 +222,15 @@ TEST(RefineBundle, LeavesSmearsThatKeypointsDoNotShow) {
   EXPECT_EQ(smeared.summary.final_cost, plain.summary.final_cost);
 }
 
+TEST(RefineBundle, KeepsNoResidualAboveTheFineRoundsLimit) {
+  const BundleProblem problem = PerturbedProblem(MakeBaScene({.noise_px = 0.5}), 0.1, 0.5);
+  BundleOptions options;
+  const BundleResult wide = RefineBundle(problem, options);
+  options.fine.max_residual = 1.0;
+  const BundleResult narrow = RefineBundle(problem, options);
+  EXPECT_LT(narrow.summary.num_observations, 0.97 * wide.summary.num_observations);
+}
+
 TEST(RefineBundle, ForgetsTheNamesOfFramesAndTracks) {
   const BaScene scene = MakeBaScene({.noise_px = 0.5});
   const BundleProblem problem = PerturbedProblem(scene, 0.1, 0.3);
