@@ -470,6 +470,7 @@ void AddBundles(const std::vector<BundleSummary>& bundles,
                         {"lens.sigma_k2", sigmas.k2}});
   }
   double bundle_seconds = 0.0;
+  double solver_seconds = 0.0;
   std::map<std::string, std::int64_t> iterations_of;
   std::map<std::string, double> seconds_of;
   for (const BundleSummary& bundle : bundles) {
@@ -477,12 +478,14 @@ void AddBundles(const std::vector<BundleSummary>& bundles,
     for (const BundleRoundSummary& round : bundle.rounds) {
       iterations_of[round.name] += round.iterations;
       seconds_of[round.name] += round.seconds;
+      solver_seconds += round.solver_seconds;
     }
   }
   for (const auto& [name, number] : iterations_of) {
     summary.ba->push_back({"iterations_of." + name, number});
     summary.seconds.push_back({"bundle_" + name, seconds_of[name]});
   }
+  summary.seconds.push_back({"bundle_solver", solver_seconds});
   summary.seconds.push_back({"bundle_adjustment", bundle_seconds});
 }
 

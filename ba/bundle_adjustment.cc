@@ -66,11 +66,11 @@ BundleState WithSomeTracks(const BundleState& state, int num_wanted) {
 }
 
 // Takes the cameras over from a part, and how its observations are weighed.
-void TakeCameras(const BundleState& part, BundleState& state) {
+void TakeCameras(const BundleState& part, int num_threads, BundleState& state) {
   state.has_smears = part.has_smears;
   state.frames = part.frames;
   state.centers = part.centers;
-  if (part.camera != state.camera) SetCamera(part.camera, state);
+  if (part.camera != state.camera) SetCamera(part.camera, num_threads, state);
 }
 
 std::vector<bool> UsedFlags(const BundleState& state) {
@@ -93,8 +93,8 @@ class Rounds {
     const auto start = std::chrono::steady_clock::now();
     last_ = round;
     ClassifyAll(round, Placement::kAnywhere, options_, state);
-    const ResidualStatistics before = Statistics(state);
     const bool is_first = result_.summary.rounds.empty();
+    const ResidualStatistics before = is_first ? Statistics(state) : ResidualStatistics{};
     Minimise(name, round, start, state);
     if (good_ && is_first) result_.summary.before = before;
   }
@@ -213,7 +213,6 @@ class Rounds {
                 const BundleRound& round,
                 std::chrono::steady_clock::time_point start,
                 BundleState& state) {
-    const auto solver_start = std::chrono::steady_clock::now();
     const std::optional<MinimisationResult> minimised =
         rotslam::Minimise(calibrated_, round, refine_lens_, options_, state);
     good_ = minimised.has_value();
@@ -231,7 +230,7 @@ class Rounds {
     summary.final_cost = solved.final_cost;
     summary.iterations = static_cast<int>(solved.iterations.size()) - 1;
     summary.termination = solved.message;
-    summary.solver_seconds = SecondsSince(solver_start);
+    summary.solver_seconds = solved.total_time_in_seconds;
     summary.seconds = SecondsSince(start);
     result_.summary.rounds.push_back(summary);
     good_ = solved.IsSolutionUsable() && AllFinite(state);
@@ -276,11 +275,11 @@ Reconstruction MapOf(const BundleState& state) {
 }
 
 // Gives the points other observations; how many more than they had.
-int Complete(const TrackCompletion& complete, BundleState& state) {
+int Complete(const TrackCompletion& complete, int num_threads, BundleState& state) {
   const Reconstruction map = MapOf(state);
   std::vector<Track> tracks = complete(map, state.camera);
   const int num_more = NumObservations(tracks) - NumObservations(map.tracks);
-  ReplaceTracks(std::move(tracks), state);
+  ReplaceTracks(std::move(tracks), num_threads, state);
   return num_more;
 }
 
@@ -353,16 +352,16 @@ BundleResult RefineBundle(const BundleProblem& problem,
   // What support is asked of.
   std::optional<BundleState> given;
   if (complete && rounds.good()) {
-    if (part) TakeCameras(*part, state);
+    if (part) TakeCameras(*part, options.num_threads, state);
     ClassifyAll(options.fine, Placement::kAnywhere, options, state);
     given = state;
-    result.summary.num_completed = Complete(complete, state);
+    result.summary.num_completed = Complete(complete, options.num_threads, state);
     if (part) part = WithSomeTracks(state, options.preparing_observations);
     rounds.Run("completed", options.coarse, preparing);
     rounds.Run("completed", rounds.FineFor(preparing), preparing);
   }
   const BundleRound close = rounds.Narrow(preparing);
-  if (part) TakeCameras(*part, state);
+  if (part) TakeCameras(*part, options.num_threads, state);
   rounds.Close(close, part ? Placement::kAnywhere : Placement::kNearby, state);
 
   BundleSummary& summary = result.summary;
@@ -377,7 +376,7 @@ BundleResult RefineBundle(const BundleProblem& problem,
     summary.final_cost = summary.rounds.back().final_cost;
   }
   if (rounds.good()) {
-    if (given) TakeCameras(state, *given);
+    if (given) TakeCameras(state, options.num_threads, *given);
     summary.support = SupportWithin(options.fine, options, given ? *given : state);
     ClassifyAll(rounds.last(), Placement::kStays, options, state);
     summary.after = Statistics(state);

@@ -74,9 +74,9 @@ struct BundleRoundSummary {
   double initial_cost = 0.0;  // half the sum of robust squared residuals, in sigmas
   double final_cost = 0.0;
   int iterations = 0;
-  std::string termination;  // Ceres' own words
-  double seconds = 0.0;     // whole round
-  double solver_seconds = 0.0;
+  std::string termination;      // Ceres' own words
+  double seconds = 0.0;         // whole round
+  double solver_seconds = 0.0;  // Ceres alone, on the problem as it has been built
 };
 
 /// What points explain within the fine round's limit, however narrow the last round was, of the

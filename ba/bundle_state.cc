@@ -7,6 +7,8 @@
 #include <string>
 #include <utility>
 
+#include "rotodom/types/parallel.h"
+
 namespace rotslam {
 namespace {
 
@@ -135,11 +137,11 @@ BundleState MakeBundleState(const BundleProblem& problem, const BundleOptions& o
     SetTrack(track, frame_index, state, entry);
     state.tracks.push_back(std::move(entry));
   }
-  SetCamera(state.camera, state);
+  SetCamera(state.camera, options.num_threads, state);
   return state;
 }
 
-void ReplaceTracks(std::vector<Track> tracks, BundleState& state) {
+void ReplaceTracks(std::vector<Track> tracks, int num_threads, BundleState& state) {
   const auto replaced = std::make_shared<const std::vector<Track>>(std::move(tracks));
   std::map<TrackId, const Track*> by_id;
   for (const Track& track : *replaced) by_id[track.id] = &track;
@@ -149,7 +151,7 @@ void ReplaceTracks(std::vector<Track> tracks, BundleState& state) {
     if (track != by_id.end()) SetTrack(*track->second, frame_index, state, entry);
   }
   state.replaced = replaced;
-  SetCamera(state.camera, state);
+  SetCamera(state.camera, num_threads, state);
 }
 
 Eigen::Matrix2d ScaleOf(const BundleState& state, const Sight& sight) {
@@ -158,14 +160,14 @@ Eigen::Matrix2d ScaleOf(const BundleState& state, const Sight& sight) {
   return Unsmearing(observation.smear) / observation.sigma_px;
 }
 
-void SetCamera(const Camera& camera, BundleState& state) {
+void SetCamera(const Camera& camera, int num_threads, BundleState& state) {
   state.camera = camera;
-  for (TrackState& track : state.tracks) {
-    for (Sight& sight : track.sights) {
+  ParallelFor(static_cast<int>(state.tracks.size()), num_threads, [&](int k) {
+    for (Sight& sight : state.tracks[k].sights) {
       const auto bearing = camera.Unproject(sight.observation->keypoint_px);
       if (bearing) sight.bearing = *bearing;
     }
-  }
+  });
 }
 
 }  // namespace rotslam

@@ -58,12 +58,12 @@ struct BundleState {
 BundleState MakeBundleState(const BundleProblem& problem, const BundleOptions& options);
 
 /// Replaces those of the state's tracks that have the ids of `tracks`. Where they are stays.
-void ReplaceTracks(std::vector<Track> tracks, BundleState& state);
+void ReplaceTracks(std::vector<Track> tracks, int num_threads, BundleState& state);
 
 /// Sigmas per pixel: the inverse root of the keypoint's covariance.
 Eigen::Matrix2d ScaleOf(const BundleState& state, const Sight& sight);
 
 /// Replaces the camera, and the bearings with it.
-void SetCamera(const Camera& camera, BundleState& state);
+void SetCamera(const Camera& camera, int num_threads, BundleState& state);
 
 }  // namespace rotslam

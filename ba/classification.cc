@@ -33,19 +33,45 @@ Sighting AsSighting(const BundleState& state, const Sight& sight, double focal_p
           sight.observation->sigma_px / focal_px};
 }
 
-// Reprojection error in pixels; nullopt where the camera cannot see the position.
-std::optional<Eigen::Vector2d> ErrorPx(const BundleState& state,
-                                       const TrackState& track,
-                                       const Sight& sight,
-                                       const Eigen::Vector3d& position) {
-  const FrameState& frame = state.frames[sight.frame];
-  const Eigen::Vector3d in_cam =
-      frame.cam_from_world *
-      (track.one_place ? position : Eigen::Vector3d(position - state.centers[frame.center]));
-  const std::optional<Eigen::Vector2d> pixel = state.camera.Project(in_cam);
-  if (!pixel) return std::nullopt;
-  return *pixel - sight.observation->keypoint_px;
-}
+// Measures tracks against what the frames, standing where they stand, have seen of them.
+class Measure {
+ public:
+  // Matrices turn faster than quaternions, and each frame turns many points.
+  explicit Measure(const BundleState& state) : state_(state) {
+    R_c_w_.reserve(state.frames.size());
+    for (const FrameState& frame : state.frames) R_c_w_.push_back(frame.cam_from_world.Matrix());
+  }
+
+  // Reprojection error; nullopt where the camera cannot see the position.
+  std::optional<Eigen::Vector2d> ErrorPx(const TrackState& track,
+                                         const Sight& sight,
+                                         const Eigen::Vector3d& position) const {
+    const Eigen::Vector3d offset =
+        track.one_place ? position : position - state_.centers[state_.frames[sight.frame].center];
+    const std::optional<Eigen::Vector2d> pixel =
+        state_.camera.Project(R_c_w_[sight.frame] * offset);
+    if (!pixel) return std::nullopt;
+    return *pixel - sight.observation->keypoint_px;
+  }
+
+  // Length of an error, in sigmas.
+  double Residual(const Sight& sight, const Eigen::Vector2d& error_px) const {
+    if (!state_.has_smears) return error_px.norm() / sight.observation->sigma_px;
+    return (ScaleOf(state_, sight) * error_px).norm();
+  }
+
+  // Of a track where it stands, in sigmas; infinite where the camera cannot see it.
+  double Residual(const TrackState& track, const Sight& sight) const {
+    const auto error_px = ErrorPx(track, sight, track.position);
+    return error_px ? Residual(sight, *error_px) : kInfinity;
+  }
+
+  const Eigen::Matrix3d& RotationOf(const Sight& sight) const { return R_c_w_[sight.frame]; }
+
+ private:
+  const BundleState& state_;
+  std::vector<Eigen::Matrix3d> R_c_w_;
+};
 
 // Which observations a position explains, and how well it does over all of them.
 struct Verdict {
@@ -62,6 +88,7 @@ class Classifier {
  public:
   Classifier(const BundleState& state, const BundleRound& round, const BundleOptions& options)
       : state_(state),
+        measure_(state),
         max_error_px_(round.max_error_px),
         max_residual_(round.max_residual),
         loss_(MakeLoss(round)),
@@ -119,7 +146,7 @@ class Classifier {
              const std::optional<Eigen::Vector3d>& position,
              Best& best) const {
     if (!position || !position->allFinite()) return;
-    Verdict verdict = Judge(track, *position);
+    Verdict verdict = Judge(track, *position, best.verdict.score);
     if (best.position && !(verdict.score < best.verdict.score)) return;
     best.position = position;
     best.num_misfits = static_cast<int>(track.sights.size()) - verdict.num_fits;
@@ -163,13 +190,19 @@ class Classifier {
            error_px.norm() <= max_error_px_ * std::max(1.0, sight.observation->sigma_px);
   }
 
-  Verdict Judge(const TrackState& track, const Eigen::Vector3d& position) const {
+  // Where the score comes to more than `score_limit`, it and the rest are of the first observations
+  // only.
+  Verdict Judge(const TrackState& track,
+                const Eigen::Vector3d& position,
+                double score_limit = kInfinity) const {
     Verdict verdict;
+    verdict.fits.reserve(track.sights.size());
     verdict.score = 0.0;
     for (const Sight& sight : track.sights) {
-      const auto error_px = ErrorPx(state_, track, sight, position);
+      if (verdict.score > score_limit) break;
+      const auto error_px = measure_.ErrorPx(track, sight, position);
       const double limit = LimitOf(sight);
-      const double residual = error_px ? (ScaleOf(state_, sight) * *error_px).norm() : kInfinity;
+      const double residual = error_px ? measure_.Residual(sight, *error_px) : kInfinity;
       const bool fits = residual <= limit && IsNear(sight, *error_px);
       verdict.fits.push_back(fits);
       verdict.num_fits += fits ? 1 : 0;
@@ -203,6 +236,7 @@ class Classifier {
       return sum.normalized();
     }
     std::vector<Sighting> sightings;
+    sightings.reserve(chosen.size());
     for (std::size_t k = 0; k < chosen.size(); ++k) {
       if (chosen[k]) {
         sightings.push_back(AsSighting(state_, track.sights[k], state_.camera.MeanFocal()));
@@ -221,10 +255,13 @@ class Classifier {
     for (std::size_t k = 0; k < chosen.size(); ++k) {
       if (!chosen[k]) continue;
       const Sight& sight = track.sights[k];
-      const FrameState& frame = state_.frames[sight.frame];
       ReprojectionJacobian J;
-      const std::optional<Eigen::Vector2d> pixel = Reproject(
-          state_.camera, frame.cam_from_world.Matrix(), state_.centers[frame.center], position, &J);
+      const std::optional<Eigen::Vector2d> pixel =
+          Reproject(state_.camera,
+                    measure_.RotationOf(sight),
+                    state_.centers[state_.frames[sight.frame].center],
+                    position,
+                    &J);
       if (!pixel) continue;
       const Eigen::Matrix2d scale = ScaleOf(state_, sight);
       const Eigen::Vector2d residual = scale * (*pixel - sight.observation->keypoint_px);
@@ -269,6 +306,7 @@ class Classifier {
   }
 
   const BundleState& state_;
+  Measure measure_;
   double max_error_px_;  // zero: whatever projects fits
   double max_residual_;  // zero: as the former, in sigmas
   std::unique_ptr<ceres::LossFunction> loss_;
@@ -299,12 +337,6 @@ void RemoveWeakFrames(const Classifier& classifier, int min_observations, Bundle
       classifier.Accept(track, fits);
     }
   }
-}
-
-// Of a used observation, in sigmas; infinite where its camera cannot see the track.
-double ResidualOf(const BundleState& state, const TrackState& track, const Sight& sight) {
-  const auto error_px = ErrorPx(state, track, sight, track.position);
-  return error_px ? (ScaleOf(state, sight) * *error_px).norm() : kInfinity;
 }
 
 // Calls visit(track, sight) for what points and directions are made of.
@@ -340,9 +372,10 @@ void ClassifyAll(const BundleRound& round,
 }
 
 double ResidualSpread(const BundleState& state) {
+  const Measure measure(state);
   std::vector<double> residuals;
   ForEachUsedSight(state, [&](const TrackState& track, const Sight& sight) {
-    residuals.push_back(ResidualOf(state, track, sight));
+    residuals.push_back(measure.Residual(track, sight));
   });
   if (residuals.empty()) return 0.0;
   std::size_t num_free = 0;
@@ -363,6 +396,7 @@ bool ShowsSmears(const BundleState& state) {
   // Shorter ones say nothing.
   constexpr double kLeastSmear = 0.05;
   constexpr int kLeastSights = 200;
+  const Measure measure(state);
   int count = 0;
   double plain_sum = 0.0;
   double unsmeared_sum = 0.0;
@@ -371,7 +405,7 @@ bool ShowsSmears(const BundleState& state) {
     const Eigen::Vector2d smear = sight.observation->smear.cast<double>();
     const double length = smear.norm();
     if (!(length > kLeastSmear)) return;
-    const auto error_px = ErrorPx(state, track, sight, track.position);
+    const auto error_px = measure.ErrorPx(track, sight, track.position);
     if (!error_px) return;
     const Eigen::Vector2d residual = *error_px / sight.observation->sigma_px;
     const double along = std::abs(residual.dot(smear)) / length;
@@ -392,13 +426,14 @@ BundleSupport SupportWithin(const BundleRound& round,
                             BundleState state) {
   ClassifyAll(round, Placement::kNearby, options, state);
   const std::unique_ptr<ceres::LossFunction> loss = MakeLoss(round);
+  const Measure measure(state);
   std::vector<bool> frame_sees(state.frames.size(), false);
   BundleSupport support;
   ForEachUsedSight(state, [&](const TrackState& track, const Sight& sight) {
     if (track.kind != TrackKind::kPoint) return;
     ++support.num_observations;
     frame_sees[sight.frame] = true;
-    const double sigmas = ResidualOf(state, track, sight);
+    const double sigmas = measure.Residual(track, sight);
     double rho[3] = {sigmas * sigmas, 1.0, 0.0};
     if (loss) loss->Evaluate(sigmas * sigmas, rho);
     support.cost += 0.5 * rho[0];
@@ -412,10 +447,11 @@ BundleSupport SupportWithin(const BundleRound& round,
 }
 
 ResidualStatistics Statistics(const BundleState& state) {
+  const Measure measure(state);
   std::vector<double> errors_px;
   ForEachUsedSight(state, [&](const TrackState& track, const Sight& sight) {
     if (track.kind != TrackKind::kPoint) return;
-    const auto error_px = ErrorPx(state, track, sight, track.position);
+    const auto error_px = measure.ErrorPx(track, sight, track.position);
     errors_px.push_back(error_px ? error_px->norm() : kInfinity);
   });
   ResidualStatistics statistics;

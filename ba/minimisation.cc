@@ -4,6 +4,7 @@
 #include <array>
 #include <deque>
 #include <memory>
+#include <memory_resource>
 #include <vector>
 
 #include <ceres/evaluation_callback.h>
@@ -239,7 +240,7 @@ class Minimisation {
     for (std::size_t k = 0; k < state_.tracks.size(); ++k) {
       state_.tracks[k].position += strays_.AcceptedShift(k).shift;
     }
-    TakeLens(bundle_options.lens);
+    TakeLens(bundle_options.lens, bundle_options.num_threads);
     return summary;
   }
 
@@ -378,7 +379,7 @@ class Minimisation {
     cameras_.FreeLens();
   }
 
-  void TakeLens(const LensOptions& options) {
+  void TakeLens(const LensOptions& options, int num_threads) {
     LensParameters lens = LensParameters::Map(cameras_.Lens());
     if (!refine_lens_ || !lens.allFinite()) return;
     const LensParameters given = LensOf(calibrated_, calibrated_);
@@ -386,7 +387,7 @@ class Minimisation {
     if (!options.refine_focal) lens[0] = given[0];
     if (!options.refine_principal_point) lens.segment<2>(2) = given.segment<2>(2);
     if (!options.refine_distortion) lens.tail<2>() = given.tail<2>();
-    SetCamera(WithLens(calibrated_, lens), state_);
+    SetCamera(WithLens(calibrated_, lens), num_threads, state_);
   }
 
   // Holds fixed frames, or else the first one, and the scale where no two held centres hold it
@@ -471,7 +472,9 @@ class Minimisation {
   const double huber_bend_;                    // 0: another loss
   std::unique_ptr<ceres::LossFunction> loss_;  // null: Huber's, or none
   ceres::SphereManifold<3> directions_;
-  std::deque<ReprojectionCost> costs_;
+  // One piece for all: they come and go together.
+  std::pmr::monotonic_buffer_resource memory_of_costs_;
+  std::pmr::deque<ReprojectionCost> costs_{&memory_of_costs_};
   std::unique_ptr<LensPriorCost> lens_prior_;
   std::unique_ptr<ScaleAnchorCost> anchor_;
   CameraBlocks cameras_;

@@ -14,14 +14,20 @@ void ParallelFor(int count, int num_threads, const std::function<void(int)>& wor
     for (int index = 0; index < count; ++index) work(index);
     return;
   }
+  // A counter that all want at once costs more than a small piece of work: several at a time, as
+  // long as the last ones do not keep the others waiting.
+  constexpr int kLeastShares = 64;
+  const int share = std::max(count / (num_workers * kLeastShares), 1);
   std::atomic<int> next = 0;
   std::vector<std::exception_ptr> errors(count);
   const auto run = [&] {
-    for (int index = next++; index < count; index = next++) {
-      try {
-        work(index);
-      } catch (...) {
-        errors[index] = std::current_exception();
+    for (int first = next.fetch_add(share); first < count; first = next.fetch_add(share)) {
+      for (int index = first; index < std::min(first + share, count); ++index) {
+        try {
+          work(index);
+        } catch (...) {
+          errors[index] = std::current_exception();
+        }
       }
     }
   };

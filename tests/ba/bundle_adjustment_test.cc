@@ -49,6 +49,10 @@ TEST(RefineBundle, FindsTheTruthOnACleanStreet) {
   EXPECT_GT(result.summary.before.rms_px, 1.0);
   // With the lens that was not needed, and widths fitted to residuals that are none.
   EXPECT_EQ(result.summary.rounds.size(), 5U);
+  for (const BundleRoundSummary& round : result.summary.rounds) {
+    EXPECT_GT(round.solver_seconds, 0.0) << round.name;
+    EXPECT_LT(round.solver_seconds, round.seconds) << round.name;
+  }
   EXPECT_TRUE(result.weak_frames.empty());
   EXPECT_GT(result.summary.num_points, 380);  // all but the shallow ones
 }
