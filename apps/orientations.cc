@@ -166,7 +166,8 @@ void TellDetails(const LoopedEstimate& estimate, Progress& progress) {
     progress.Detail("frame " + std::to_string(check.frame.value) + " looks like frame " +
                     std::to_string(check.match.value) + ": " + std::to_string(check.num_inliers) +
                     " inliers, " + std::to_string(check.angle_deg) + " deg around the loop, " +
-                    (check.accepted ? "accepted" : "not accepted"));
+                    (check.accepted ? "accepted, " + std::to_string(check.num_edges) + " edges"
+                                    : std::string("not accepted")));
   }
 }
 
@@ -363,7 +364,8 @@ std::vector<LoopRow> LoopRows(const Orientations& orientations) {
                     check.angle_deg,
                     check.accepted,
                     check.way.turn_scale,
-                    check.way.angle_deg});
+                    check.way.angle_deg,
+                    check.num_edges});
   }
   return rows;
 }

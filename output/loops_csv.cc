@@ -13,7 +13,8 @@
 namespace rotslam {
 
 void WriteLoopsCsv(const std::filesystem::path& path, const std::vector<LoopRow>& rows) {
-  std::string text = "frame,match,score,inliers,angle_deg,accepted,turn_scale,scaled_angle_deg\n";
+  std::string text =
+      "frame,match,score,inliers,angle_deg,accepted,turn_scale,scaled_angle_deg,edges\n";
   for (const LoopRow& row : rows) {
     const std::array<double, 4> numbers = {
         row.score, row.angle_deg, row.turn_scale, row.scaled_angle_deg};
@@ -25,13 +26,13 @@ void WriteLoopsCsv(const std::filesystem::path& path, const std::vector<LoopRow>
             FormatNumber("%.6g", row.score) + ',' + std::to_string(row.inliers) + ',' +
             FormatNumber("%.6g", row.angle_deg) + ',' + (row.accepted ? "1," : "0,") +
             FormatNumber("%.6g", row.turn_scale) + ',' +
-            FormatNumber("%.6g", row.scaled_angle_deg) + '\n';
+            FormatNumber("%.6g", row.scaled_angle_deg) + ',' + std::to_string(row.edges) + '\n';
   }
   ReplaceFile(path, text);
 }
 
 std::vector<LoopRow> ReadLoopsCsv(const std::filesystem::path& path) {
-  constexpr std::size_t kNumColumns = 8;
+  constexpr std::size_t kNumColumns = 9;
   const std::vector<TextRow> texts = ReadCsvRows(path, kNumColumns);
   std::vector<LoopRow> rows;
   rows.reserve(texts.size());
@@ -44,7 +45,8 @@ std::vector<LoopRow> ReadLoopsCsv(const std::filesystem::path& path) {
                     number(4),
                     number(5) != 0.0,
                     number(6),
-                    number(7)});
+                    number(7),
+                    IntegerAt(path, text, 8, 0)});
   }
   return rows;
 }

@@ -16,10 +16,11 @@ struct LoopRow {
   // What all turns of the way in between are scaled by to fit best, and what is left of the angle.
   double turn_scale = 1.0;
   double scaled_angle_deg = 0.0;
+  int edges = 0;  // of the view-graph that come of it
 };
 
-/// loops.csv: `frame,match,score,inliers,angle_deg,accepted,turn_scale,scaled_angle_deg`, one line
-/// per row; accepted is 1 or 0. Throws std::invalid_argument for a number that is not finite,
+/// loops.csv: `frame,match,score,inliers,angle_deg,accepted,turn_scale,scaled_angle_deg,edges`, one
+/// line per row; accepted is 1 or 0. Throws std::invalid_argument for a number that is not finite,
 /// std::runtime_error when the file cannot be written; never leaves half a file.
 void WriteLoopsCsv(const std::filesystem::path& path, const std::vector<LoopRow>& rows);
 

@@ -10,15 +10,23 @@ namespace rotslam {
 
 template <class Archive>
 void TransferValue(Archive& archive, LoopCheck& check) {
-  auto& [frame, match, score, num_inliers, angle_deg, way, accepted] = check;
+  auto& [frame, match, score, num_inliers, angle_deg, way, accepted, num_edges] = check;
   auto& [turn_scale, scaled_angle_deg] = way;
-  archive(frame, match, score, num_inliers, angle_deg, turn_scale, scaled_angle_deg, accepted);
+  archive(frame,
+          match,
+          score,
+          num_inliers,
+          angle_deg,
+          turn_scale,
+          scaled_angle_deg,
+          accepted,
+          num_edges);
 }
 
 template <class Archive>
 void TransferValue(Archive& archive, LoopReport& report) {
-  auto& [checks, connections, waiting] = report;
-  archive(checks, connections, waiting);
+  auto& [checks, connections, waiting, matches] = report;
+  archive(checks, connections, waiting, matches);
 }
 
 template <class Archive>

@@ -154,14 +154,20 @@ LoopReport LoopClosure::VerifyBest(const Place& place,
       evidence.accepted = !evidence.connections.empty();
       if (!evidence.accepted) report.waiting.push_back(std::move(doubtful));
     }
-    if (evidence.accepted) report.connections = std::move(evidence.connections);
+    if (evidence.accepted) {
+      report.connections = std::move(evidence.connections);
+      for (Connection& unproven : evidence.unproven) {
+        report.matches.push_back(std::move(unproven.matches));
+      }
+    }
     report.checks.push_back({place.corners.frame,
                              evidence.match,
                              candidates[k].score,
                              evidence.num_inliers,
                              evidence.angle_deg,
                              evidence.way,
-                             evidence.accepted});
+                             evidence.accepted,
+                             static_cast<int>(report.connections.size())});
   }
   return report;
 }
@@ -171,6 +177,7 @@ void LoopClosure::Remember(Place place, const LoopReport& report) {
   for (const Connection& connection : report.connections) {
     finder_.Join(connection.edge.i, connection.edge.j);
   }
+  for (const EdgeMatches& matches : report.matches) finder_.Join(matches.frame_i, matches.frame_j);
   waiting_.Remove(report.connections);
   for (const Connection& connection : report.waiting) waiting_.Add(connection);
   places_.emplace(frame, std::move(place));
@@ -252,17 +259,27 @@ LoopEvidence LoopClosure::Verify(const Place& place,
     if (static_cast<int>(old_places.size()) > options_.max_neighbours) break;
     if (neighbour != frame) old_places.push_back(&places_.at(neighbour).corners);
   }
+  TurningRates rates;
+  const auto time_s = [&](FrameId of) { return timestamps_s_.at(of); };
+  const auto add_rate = [&](FrameId of) {
+    if (const auto rate = RateOf(of, cam_from_world, time_s)) rates[of] = *rate;
+  };
+  add_rate(frame);
+  for (const Features* old_place : old_places) add_rate(old_place->frame);
   LoopEvidence evidence = VerifyLoop(place.corners,
                                      old_places,
                                      cam_from_world,
+                                     rates,
                                      candidate.num_consistent,
                                      pieces.Find(candidate.frame.value) == pieces.Find(frame.value),
                                      camera_,
                                      options_.verification,
                                      tools_);
-  for (Connection& connection : evidence.connections) {
-    connection.matches.pairs = MatchesOfFeatures(
-        connection.matches.pairs, places_.at(connection.edge.i).features, place.features);
+  for (auto* connections : {&evidence.connections, &evidence.unproven}) {
+    for (Connection& connection : *connections) {
+      connection.matches.pairs = MatchesOfFeatures(
+          connection.matches.pairs, places_.at(connection.edge.i).features, place.features);
+    }
   }
   return evidence;
 }

@@ -71,6 +71,7 @@ struct LoopCheck {
   double angle_deg = 0.0;
   WayAround way;
   bool accepted = false;
+  int num_edges = 0;  // that it has brought; none where nobody knows how the views are turned
 };
 
 /// What became of one frame.
@@ -80,6 +81,8 @@ struct LoopReport {
   // its own confirm.
   std::vector<Connection> connections;
   std::vector<Connection> waiting;  // from older places to it, for others to confirm
+  // With older places that are the same, but nobody knows how they are turned.
+  std::vector<EdgeMatches> matches;
 };
 
 /// Where the time goes, seconds since the start.

@@ -17,6 +17,7 @@ void DropWhatTracksNeed(FrameRecord& record) {
        {&record.estimate.connections, &record.loops.connections, &record.loops.waiting}) {
     for (Connection& connection : *connections) connection.matches.pairs.clear();
   }
+  for (EdgeMatches& matches : record.loops.matches) matches.pairs.clear();
 }
 
 }  // namespace
@@ -74,6 +75,7 @@ LoopedEstimate LoopedOdometry::Take(FrameEstimate estimate, LoopReport loops) {
   looped.points = {estimate.timestamp_s, estimate.features.tracks, estimate.features.keypoints_px};
   orientations_.AddFrame(std::move(estimate));
   orientations_.AddLoop(std::move(loops.connections));
+  orientations_.AddMatches(std::move(loops.matches));
   looped.loops = std::move(loops.checks);
   looped.has_averaged = orientations_.EndFrame();
   looped.cam_from_world = result().cam_from_world.at(looped.frame);
@@ -84,6 +86,7 @@ std::vector<LoopCheck> LoopedOdometry::Finish() {
   LoopReport loops;
   if (closure_) loops = closure_->Finish(result().cam_from_world, orientations_.pieces());
   orientations_.AddLoop(std::move(loops.connections));
+  orientations_.AddMatches(std::move(loops.matches));
   orientations_.Finish();
   // Orientations still in the window have not been said to be settled.
   int count = 0;

@@ -1,6 +1,7 @@
 #include "rotodom/loop/looped_orientations.h"
 
 #include <algorithm>
+#include <iterator>
 #include <utility>
 
 #include "rotodom/averaging/global_averaging.h"
@@ -51,6 +52,11 @@ void LoopedOrientations::AddLoop(std::vector<Connection> connections) {
     result_.graph.AddEdge(connection.edge);
     if (keep_features_) result_.edge_matches.push_back(std::move(connection.matches));
   }
+}
+
+void LoopedOrientations::AddMatches(std::vector<EdgeMatches> matches) {
+  if (!keep_features_) return;
+  std::move(matches.begin(), matches.end(), std::back_inserter(result_.edge_matches));
 }
 
 bool LoopedOrientations::EndFrame() {

@@ -1,8 +1,11 @@
 #include "rotodom/loop/verification.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <iterator>
+#include <tuple>
+#include <utility>
 
 #include <Eigen/Eigenvalues>
 
@@ -19,59 +22,147 @@ double LargestSigmaDeg(const Eigen::Matrix3d& covariance) {
 // What one old place says of where the view looks.
 struct Opinion {
   Connection connection;
+  Rotation old_from_world;
   Rotation view_from_world;
-  double sigma_deg = 0.0;   // of the least certain axis
-  bool is_certain = false;  // else it can but confirm others
+  double sigma_deg = 0.0;             // of the least certain axis
+  bool is_certain = false;            // else it can but confirm others
+  std::optional<Connection> smeared;  // what it says of smeared corners
+  bool is_alike = false;              // that is certain, too, and much the same
 };
+
+// Keypoints of an old place and of the view that look alike.
+using KeypointPairs = std::vector<std::array<int, 2>>;
 
 class Verifier {
  public:
   Verifier(const Features& view,
+           const TurningRates& rates,
            const Camera& camera,
            const VerificationOptions& options,
            const VerificationTools& tools)
-      : view_(view), camera_(camera), options_(options), tools_(tools) {}
+      : view_(view), rates_(rates), camera_(camera), options_(options), tools_(tools) {}
 
   // By the edge from an old place; nullopt where too few matches agree.
+  // @param asks_twice  whether it must say the same of smeared corners.
   std::optional<Opinion> Ask(const Features& old_place,
                              const Rotation& old_from_world,
-                             const Rotation& predicted_view_from_world) const {
+                             const Rotation& predicted_view_from_world,
+                             bool asks_twice) const {
     const Rotation predicted_view_from_old = predicted_view_from_world * old_from_world.Inverse();
     const Matches matches =
         MatchFeatures(old_place, view_, predicted_view_from_old, camera_, tools_.matching);
-    std::vector<std::array<int, 2>> keypoints;
+    KeypointPairs keypoints;
     keypoints.reserve(matches.matches.size());
     for (const Match& match : matches.matches) keypoints.push_back({match.i.value, match.j.value});
     std::optional<Connection> connection =
-        ConnectByMatches(old_place,
-                         view_,
-                         keypoints,
-                         predicted_view_from_old,
-                         camera_.MeanFocal(),
-                         {tools_.relative_rotation, tools_.seed, tools_.num_threads});
+        Connect(old_place, keypoints, predicted_view_from_old, {});
     if (!connection) return std::nullopt;
     const int inliers = connection->edge.num_inliers;
     const double least = options_.min_inlier_ratio * static_cast<double>(keypoints.size());
     if (inliers < options_.min_inliers || inliers < least) return std::nullopt;
-    Eigen::Matrix3d& covariance = connection->edge.covariance;
-    const double seen_sigma_deg = LargestSigmaDeg(covariance);
+    const double seen_sigma_deg = LargestSigmaDeg(connection->edge.covariance);
     if (seen_sigma_deg > options_.max_witness_sigma_deg) return std::nullopt;
-    if (camera_.readout_s > 0.0) {
-      const double sigma = options_.shutter_sigma_deg * kRadFromDeg;
-      covariance += sigma * sigma * Eigen::Matrix3d::Identity();
+    Opinion opinion;
+    opinion.is_certain = seen_sigma_deg <= options_.max_sigma_deg;
+    opinion.old_from_world = old_from_world;
+    opinion.view_from_world = connection->edge.j_from_i * old_from_world;
+    opinion.smeared = asks_twice && AreSmeared(old_place)
+                          ? AskedAgain(old_place, keypoints, predicted_view_from_old, *connection)
+                          : connection;
+    if (opinion.smeared) {
+      RelativeRotation& edge = opinion.smeared->edge;
+      const Rotation between = connection->edge.j_from_i * edge.j_from_i.Inverse();
+      opinion.is_alike = LargestSigmaDeg(edge.covariance) <= options_.max_sigma_deg &&
+                         between.AngleDeg() <= options_.max_cycle_deg;
+      AddShutterError(edge);
     }
-    const double sigma_deg = LargestSigmaDeg(covariance);
-    const Rotation view_from_world = connection->edge.j_from_i * old_from_world;
-    const bool is_certain = seen_sigma_deg <= options_.max_sigma_deg;
-    return Opinion{*std::move(connection), view_from_world, sigma_deg, is_certain};
+    AddShutterError(connection->edge);
+    opinion.sigma_deg = LargestSigmaDeg(connection->edge.covariance);
+    opinion.connection = *std::move(connection);
+    return opinion;
   }
 
  private:
+  std::optional<Connection> Connect(const Features& old_place,
+                                    const KeypointPairs& keypoints,
+                                    const Rotation& predicted_view_from_old,
+                                    const std::vector<MatchNoise>& noise) const {
+    return ConnectByMatches(old_place,
+                            view_,
+                            keypoints,
+                            predicted_view_from_old,
+                            camera_.MeanFocal(),
+                            {tools_.relative_rotation, tools_.seed, tools_.num_threads},
+                            noise);
+  }
+
+  // The edge as smeared corners have it, if it is certain enough to confirm others.
+  std::optional<Connection> AskedAgain(const Features& old_place,
+                                       const KeypointPairs& keypoints,
+                                       const Rotation& predicted_view_from_old,
+                                       const Connection& connection) const {
+    const Rotation& view_from_old = connection.edge.j_from_i;
+    std::optional<Connection> smeared = Connect(old_place,
+                                                keypoints,
+                                                predicted_view_from_old,
+                                                SmearedNoise(old_place, keypoints, view_from_old));
+    if (!smeared) return std::nullopt;
+    if (LargestSigmaDeg(smeared->edge.covariance) > options_.max_witness_sigma_deg) {
+      return std::nullopt;
+    }
+    return smeared;
+  }
+
+  void AddShutterError(RelativeRotation& edge) const {
+    if (camera_.readout_s == 0.0) return;
+    const double sigma = options_.shutter_sigma_deg * kRadFromDeg;
+    edge.covariance += sigma * sigma * Eigen::Matrix3d::Identity();
+  }
+
+  // Whether turns smear the corners of either image so that it would matter.
+  bool AreSmeared(const Features& old_place) const {
+    constexpr double kLeastSmear = 0.3;  // an ellipse 1.04 times as long as wide
+    const auto view_rate = rates_.find(view_.frame);
+    const auto old_rate = rates_.find(old_place.frame);
+    if (view_rate == rates_.end() || old_rate == rates_.end()) return false;
+    const double rate = std::max(view_rate->second.norm(), old_rate->second.norm());
+    return options_.smear_s_per_px * camera_.MeanFocal() * rate > kLeastSmear;
+  }
+
+  // Of each match, in units of an unsmeared corner's variance.
+  std::vector<MatchNoise> SmearedNoise(const Features& old_place,
+                                       const KeypointPairs& keypoints,
+                                       const Rotation& view_from_old) const {
+    const auto covariance_px = [&](const Features& features, int index) {
+      const Eigen::Vector2d smear = SmearOf(
+          camera_, features.bearings[index], rates_.at(features.frame), options_.smear_s_per_px);
+      return Eigen::Matrix2d(Eigen::Matrix2d::Identity() + smear * smear.transpose());
+    };
+    const Eigen::Matrix3d R_view_old = view_from_old.Matrix();
+    std::vector<MatchNoise> noise;
+    noise.reserve(keypoints.size());
+    for (const auto& [of_old, of_view] : keypoints) {
+      noise.push_back({DifferenceCovariance(old_place.bearings[of_old],
+                                            covariance_px(old_place, of_old),
+                                            view_.bearings[of_view],
+                                            covariance_px(view_, of_view),
+                                            R_view_old),
+                       0.0});
+    }
+    return noise;
+  }
+
   const Features& view_;
+  const TurningRates& rates_;
   const Camera& camera_;
   const VerificationOptions& options_;
   const VerificationTools& tools_;
 };
+
+// Where the view looks, by smeared corners.
+Rotation ViewBySmeared(const Opinion& opinion) {
+  return opinion.smeared->edge.j_from_i * opinion.old_from_world;
+}
 
 // What may be wrong with the rotation around a short cycle: this, or so many deviations of its
 // edges; turns are wrong by this share.
@@ -92,7 +183,7 @@ bool DoAgree(const Opinion& one, const Opinion& other, const CycleBound& bound) 
 }
 
 // The opinions that agree with a certain one, that being the one around which most matches do;
-// positions, the most certain one first.
+// positions, in no order.
 std::vector<int> LargestAgreement(const std::vector<Opinion>& opinions, const CycleBound& bound) {
   const auto inliers = [&](int index) { return opinions[index].connection.edge.num_inliers; };
   const int count = static_cast<int>(opinions.size());
@@ -111,13 +202,23 @@ std::vector<int> LargestAgreement(const std::vector<Opinion>& opinions, const Cy
     most_inliers = num_inliers;
     largest = std::move(agreeing);
   }
-  const auto doubt = [&](int index) {
-    const Opinion& opinion = opinions[index];
-    return std::pair(!opinion.is_certain, opinion.connection.edge.covariance.trace());
-  };
-  std::stable_sort(
-      largest.begin(), largest.end(), [&](int a, int b) { return doubt(a) < doubt(b); });
   return largest;
+}
+
+// Whether an opinion's edge may go into the graph: what it says of smeared corners is what it says
+// of others, or what another one says of smeared corners.
+bool IsProven(const std::vector<Opinion>& opinions,
+              const std::vector<int>& agreeing,
+              int index,
+              double max_angle_deg) {
+  const Opinion& opinion = opinions[index];
+  if (!opinion.is_certain || !opinion.smeared) return false;
+  if (opinion.is_alike) return true;
+  return std::any_of(agreeing.begin(), agreeing.end(), [&](int other) {
+    if (other == index || !opinions[other].smeared) return false;
+    const Rotation around = ViewBySmeared(opinion) * ViewBySmeared(opinions[other]).Inverse();
+    return around.AngleDeg() <= max_angle_deg;
+  });
 }
 
 }  // namespace
@@ -131,6 +232,7 @@ std::optional<std::string> VerificationOptions::Problem() const {
   if (!(max_witness_sigma_deg >= max_sigma_deg)) {
     return OutOfRange("max_witness_sigma_deg", max_witness_sigma_deg, "at least max_sigma_deg");
   }
+  if (!(smear_s_per_px >= 0.0)) return OutOfRange("smear_s_per_px", smear_s_per_px, "zero or more");
   if (!(shutter_sigma_deg >= 0.0)) {
     return OutOfRange("shutter_sigma_deg", shutter_sigma_deg, "zero or more");
   }
@@ -188,40 +290,53 @@ WayAround ScaleTurns(const RotationMap& cam_from_world,
 LoopEvidence VerifyLoop(const Features& view,
                         std::span<const Features* const> old_places,
                         const RotationMap& cam_from_world,
+                        const TurningRates& rates,
                         int num_consistent,
                         bool is_way_known,
                         const Camera& camera,
                         const VerificationOptions& options,
                         const VerificationTools& tools) {
-  const Verifier verifier(view, camera, options, tools);
+  const Verifier verifier(view, rates, camera, options, tools);
   const Rotation& present_view_from_world = cam_from_world.at(view.frame);
   LoopEvidence evidence;
   evidence.match = old_places.front()->frame;
   std::vector<Opinion> opinions;
   for (const Features* old_place : old_places) {
     const Rotation& old_from_world = cam_from_world.at(old_place->frame);
-    auto opinion = verifier.Ask(*old_place, old_from_world, present_view_from_world);
+    auto opinion = verifier.Ask(*old_place, old_from_world, present_view_from_world, is_way_known);
     if (opinion) opinions.push_back(*std::move(opinion));
     // Neighbours are witnesses; where the likeliest place says no, they are not asked.
     if (opinions.empty()) return evidence;
   }
-  const auto scale_turns = [&](const Opinion& opinion) {
-    return is_way_known
-               ? ScaleTurns(cam_from_world, opinion.connection.edge, options.max_turn_error)
-               : WayAround();
+  const auto scale_turns = [&](const RelativeRotation& edge) {
+    return is_way_known ? ScaleTurns(cam_from_world, edge, options.max_turn_error) : WayAround();
   };
   const auto certain = std::find_if(
       opinions.begin(), opinions.end(), [](const Opinion& opinion) { return opinion.is_certain; });
   if (certain == opinions.end()) return evidence;
   // The way to one place says how wrong turns are; that to the next one says the same.
-  const double turn_error = std::abs(scale_turns(*certain).turn_scale - 1.0);
-  const std::vector<int> agreeing =
+  const double turn_error = std::abs(scale_turns(certain->connection.edge).turn_scale - 1.0);
+  std::vector<int> agreeing =
       LargestAgreement(opinions, {options.max_cycle_deg, options.max_cycle_sigmas, turn_error});
+  std::vector<bool> is_proven(opinions.size(), false);
+  for (const int index : agreeing) {
+    is_proven[index] = IsProven(opinions, agreeing, index, options.max_cycle_deg);
+  }
+  const auto doubt = [&](int index) {
+    const Opinion& opinion = opinions[index];
+    return std::tuple(
+        !opinion.is_certain, !is_proven[index], opinion.connection.edge.covariance.trace());
+  };
+  std::stable_sort(
+      agreeing.begin(), agreeing.end(), [&](int a, int b) { return doubt(a) < doubt(b); });
   const Opinion& best = opinions[agreeing.front()];
-  evidence.match = best.connection.edge.i;
-  evidence.num_inliers = best.connection.edge.num_inliers;
-  evidence.angle_deg = (best.view_from_world * present_view_from_world.Inverse()).AngleDeg();
-  evidence.way = scale_turns(best);
+  const RelativeRotation& edge =
+      (is_proven[agreeing.front()] ? *best.smeared : best.connection).edge;
+  evidence.match = edge.i;
+  evidence.num_inliers = edge.num_inliers;
+  const Rotation view_from_world = edge.j_from_i * cam_from_world.at(edge.i);
+  evidence.angle_deg = (view_from_world * present_view_from_world.Inverse()).AngleDeg();
+  evidence.way = scale_turns(edge);
   const int num_frames = view.frame.value - evidence.match.value;
   const double drift_deg = options.max_drift_deg + options.max_drift_deg_per_sqrt_frame *
                                                        std::sqrt(static_cast<double>(num_frames));
@@ -232,7 +347,11 @@ LoopEvidence VerifyLoop(const Features& view,
                       (!is_way_known || evidence.way.angle_deg <= drift_deg);
   for (const int index : agreeing) {
     if (!opinions[index].is_certain) break;
-    evidence.connections.push_back(std::move(opinions[index].connection));
+    if (is_proven[index]) {
+      evidence.connections.push_back(*opinions[index].smeared);
+    } else {
+      evidence.unproven.push_back(opinions[index].connection);
+    }
   }
   return evidence;
 }

@@ -24,17 +24,14 @@ struct WhitenedErrors {
   double shared = 0.0;    // of an error as large as the shared one, along the line
 };
 
-// Covariance of the difference of bearings in view j, along the columns of `basis_j`, in units of a
-// squared pixel.
+// In units of a squared pixel.
 Eigen::Matrix2d CovarianceOfDifference(const Eigen::Vector3d& bearing_i,
                                        const Eigen::Vector3d& bearing_j,
-                                       const Eigen::Matrix<double, 3, 2>& basis_j,
                                        const Eigen::Matrix3d& R_j_i,
                                        const KeypointCovariances& covariances) {
-  const Eigen::Matrix2d carried = basis_j.transpose() * R_j_i * TangentBasis(bearing_i);
   const Eigen::Matrix2d floor = kSmallestSigmaPx * kSmallestSigmaPx * Eigen::Matrix2d::Identity();
-  return carried * TangentCovariance(bearing_i, covariances.i_px) * carried.transpose() +
-         TangentCovariance(bearing_j, covariances.j_px) + floor;
+  return DifferenceCovariance(bearing_i, covariances.i_px, bearing_j, covariances.j_px, R_j_i) +
+         floor;
 }
 
 class Whitening {
@@ -54,7 +51,7 @@ class Whitening {
         squared_pixel_ *
         (covariances == nullptr
              ? Eigen::Matrix2d(2.0 * Eigen::Matrix2d::Identity())
-             : CovarianceOfDifference(bearing_i, bearing_j, basis, rotation_, *covariances));
+             : CovarianceOfDifference(bearing_i, bearing_j, rotation_, *covariances));
     const Eigen::Vector2d across = (basis.transpose() * direction_.cross(bearing_j)).normalized();
     const Eigen::Vector2d along(-across.y(), across.x());
     const Eigen::Vector2d of_rotation = basis.transpose() * (rotation_ * bearing_i - bearing_j);

@@ -20,4 +20,15 @@ Eigen::Matrix2d TangentCovariance(const Eigen::Vector3d& bearing,
   return J * image_covariance * J.transpose();
 }
 
+Eigen::Matrix2d DifferenceCovariance(const Eigen::Vector3d& bearing_i,
+                                     const Eigen::Matrix2d& image_covariance_i,
+                                     const Eigen::Vector3d& bearing_j,
+                                     const Eigen::Matrix2d& image_covariance_j,
+                                     const Eigen::Matrix3d& R_j_i) {
+  const Eigen::Matrix2d carried =
+      TangentBasis(bearing_j).transpose() * R_j_i * TangentBasis(bearing_i);
+  return carried * TangentCovariance(bearing_i, image_covariance_i) * carried.transpose() +
+         TangentCovariance(bearing_j, image_covariance_j);
+}
+
 }  // namespace rotslam

@@ -38,4 +38,13 @@ Eigen::Matrix<double, 3, 2> TangentBasis(const Eigen::Vector3d& direction);
 Eigen::Matrix2d TangentCovariance(const Eigen::Vector3d& bearing,
                                   const Eigen::Matrix2d& image_covariance);
 
+/// The covariance of what R f_i and f_j differ by, f_i and f_j being bearings of one point in two
+/// images: for MatchNoise::covariance_j, with variance_i = 0.
+/// @param image_covariance_i, image_covariance_j  of where the two images show it.
+Eigen::Matrix2d DifferenceCovariance(const Eigen::Vector3d& bearing_i,
+                                     const Eigen::Matrix2d& image_covariance_i,
+                                     const Eigen::Vector3d& bearing_j,
+                                     const Eigen::Matrix2d& image_covariance_j,
+                                     const Eigen::Matrix3d& R_j_i);
+
 }  // namespace rotslam

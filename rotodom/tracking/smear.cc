@@ -18,22 +18,39 @@ constexpr double kShortTime_s = 1e-3;
 
 }  // namespace
 
+std::optional<Eigen::Vector3d> RateOf(FrameId frame,
+                                      const RotationMap& cam_from_world,
+                                      const std::function<double(FrameId)>& time_s) {
+  const auto here = cam_from_world.find(frame);
+  if (here == cam_from_world.end()) return std::nullopt;
+  std::vector<TimedOrientation> others;
+  const auto add = [&](RotationMap::const_iterator other) {
+    if (std::abs(time_s(other->first) - time_s(frame)) > kFarthestNeighbour_s) return;
+    others.push_back({time_s(other->first), other->second});
+  };
+  if (here != cam_from_world.begin()) add(std::prev(here));
+  if (std::next(here) != cam_from_world.end()) add(std::next(here));
+  if (others.empty()) return std::nullopt;
+  return MotionThrough({time_s(frame), here->second}, others).coefficients.col(0);
+}
+
 TurningRates RatesOf(const RotationMap& cam_from_world,
                      const std::function<double(FrameId)>& time_s) {
   TurningRates rates;
-  for (auto here = cam_from_world.begin(); here != cam_from_world.end(); ++here) {
-    std::vector<TimedOrientation> others;
-    const auto add = [&](RotationMap::const_iterator other) {
-      if (std::abs(time_s(other->first) - time_s(here->first)) > kFarthestNeighbour_s) return;
-      others.push_back({time_s(other->first), other->second});
-    };
-    if (here != cam_from_world.begin()) add(std::prev(here));
-    if (std::next(here) != cam_from_world.end()) add(std::next(here));
-    if (others.empty()) continue;
-    rates[here->first] =
-        MotionThrough({time_s(here->first), here->second}, others).coefficients.col(0);
+  for (const auto& [frame, orientation] : cam_from_world) {
+    if (const auto rate = RateOf(frame, cam_from_world, time_s)) rates[frame] = *rate;
   }
   return rates;
+}
+
+Eigen::Vector2d SmearOf(const Camera& camera,
+                        const Eigen::Vector3d& bearing,
+                        const Eigen::Vector3d& rate,
+                        double smear_s_per_px) {
+  const auto now = camera.Project(bearing);
+  const auto soon = camera.Project(bearing + kShortTime_s * rate.cross(bearing));
+  if (!now || !soon) return Eigen::Vector2d::Zero();
+  return smear_s_per_px / kShortTime_s * (*soon - *now);
 }
 
 void SetSmears(const Camera& camera,
@@ -45,11 +62,8 @@ void SetSmears(const Camera& camera,
       observation.smear.setZero();
       const auto rate = rates.find(observation.frame);
       if (rate == rates.end()) continue;
-      const Eigen::Vector3d& bearing = observation.bearing;
-      const auto now = camera.Project(bearing);
-      const auto soon = camera.Project(bearing + kShortTime_s * rate->second.cross(bearing));
-      if (!now || !soon) continue;
-      const Eigen::Vector2d smear = smear_s_per_px / kShortTime_s * (*soon - *now);
+      const Eigen::Vector2d smear =
+          SmearOf(camera, observation.bearing, rate->second, smear_s_per_px);
       observation.smear = (smear * std::min(1.0, kLongestSmear / smear.norm())).cast<float>();
     }
   }

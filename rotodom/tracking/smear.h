@@ -2,6 +2,7 @@
 
 #include <functional>
 #include <map>
+#include <optional>
 #include <vector>
 
 #include <Eigen/Core>
@@ -15,11 +16,26 @@ namespace rotslam {
 /// How fast frames turn, rad/s in camera axes.
 using TurningRates = std::map<FrameId, Eigen::Vector3d>;
 
-/// Rates through the orientations next to each frame. A frame of which none is within 0.15 s has no
-/// rate: of stills nobody knows how they turned while they were exposed.
+/// The rate through the orientations next to a frame.
 /// @param time_s  of each frame; ascending.
+/// @return  nullopt where none of them is within 0.15 s: of stills nobody knows how they turned
+///          while they were exposed.
+std::optional<Eigen::Vector3d> RateOf(FrameId frame,
+                                      const RotationMap& cam_from_world,
+                                      const std::function<double(FrameId)>& time_s);
+
+/// Those of all frames that have one.
 TurningRates RatesOf(const RotationMap& cam_from_world,
                      const std::function<double(FrameId)>& time_s);
+
+/// What a turn makes of a keypoint while it is exposed, as in Observation::smear, however long.
+/// @param rate            rad/s, in camera axes.
+/// @param smear_s_per_px  its length by the speed of the image, px/s.
+/// @return  zero where the camera does not see the bearing.
+Eigen::Vector2d SmearOf(const Camera& camera,
+                        const Eigen::Vector3d& bearing,
+                        const Eigen::Vector3d& rate,
+                        double smear_s_per_px);
 
 /// Says of each observation how its frame's turn smears it (Observation::smear); of frames without
 /// a rate nothing does.

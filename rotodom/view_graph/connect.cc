@@ -80,12 +80,14 @@ ConnectionHypotheses HypothesesByMatches(const Features& view_i,
                                          const std::vector<std::array<int, 2>>& keypoints,
                                          const Rotation& predicted_j_from_i,
                                          double focal_px,
-                                         const ConnectOptions& options) {
+                                         const ConnectOptions& options,
+                                         std::span<const MatchNoise> noise = {}) {
   std::vector<BearingPair> pairs;
   pairs.reserve(keypoints.size());
   for (const auto& [of_i, of_j] : keypoints) {
     pairs.push_back({view_i.bearings[of_i], view_j.bearings[of_j]});
   }
+  for (std::size_t k = 0; k < noise.size(); ++k) pairs[k].noise = noise[k];
   const FrameId i = view_i.frame;
   const FrameId j = view_j.frame;
   const std::uint64_t seed = options.seed * 0x9E3779B97F4A7C15ULL +
@@ -127,9 +129,10 @@ std::optional<Connection> ConnectByMatches(const Features& view_i,
                                            const std::vector<std::array<int, 2>>& keypoints,
                                            const Rotation& predicted_j_from_i,
                                            double focal_px,
-                                           const ConnectOptions& options) {
+                                           const ConnectOptions& options,
+                                           std::span<const MatchNoise> noise) {
   ConnectionHypotheses hypotheses =
-      HypothesesByMatches(view_i, view_j, keypoints, predicted_j_from_i, focal_px, options);
+      HypothesesByMatches(view_i, view_j, keypoints, predicted_j_from_i, focal_px, options, noise);
   if (hypotheses.connections.empty()) return std::nullopt;
   return std::move(hypotheses.connections.front());
 }

@@ -3,6 +3,7 @@
 #include <array>
 #include <cstdint>
 #include <optional>
+#include <span>
 #include <string>
 #include <vector>
 
@@ -63,13 +64,15 @@ struct ConnectOptions {
 
 /// The edge between two views from keypoints that seem to show the same points.
 /// @param keypoints  of view_i and of view_j.
+/// @param noise      one for each of them, or none: then they are all alike.
 /// @return  nullopt when fewer than relative_rotation.min_inliers of them agree.
 std::optional<Connection> ConnectByMatches(const Features& view_i,
                                            const Features& view_j,
                                            const std::vector<std::array<int, 2>>& keypoints,
                                            const Rotation& predicted_j_from_i,
                                            double focal_px,
-                                           const ConnectOptions& options);
+                                           const ConnectOptions& options,
+                                           std::span<const MatchNoise> noise = {});
 
 /// Estimates the relative rotations between `view` and each of `others` from the points that both
 /// show. Where those allow two rotations, the one that agrees with the other pairs is taken

@@ -14,7 +14,7 @@ namespace rotslam {
 namespace {
 
 std::vector<LoopRow> SomeRows() {
-  return {{120, 3, 0.0625, 187, 2.5, true, 1.04, 0.5}, {131, 7, 1.0 / 3.0, 0, 0.0, false}};
+  return {{120, 3, 0.0625, 187, 2.5, true, 1.04, 0.5, 2}, {131, 7, 1.0 / 3.0, 0, 0.0, false}};
 }
 
 TEST(LoopsCsv, HasOneLinePerRow) {
@@ -22,12 +22,12 @@ TEST(LoopsCsv, HasOneLinePerRow) {
   const std::filesystem::path path = folder.path() / "loops.csv";
   WriteLoopsCsv(path, SomeRows());
   EXPECT_EQ(ReadWholeFile(path),
-            "frame,match,score,inliers,angle_deg,accepted,turn_scale,scaled_angle_deg\n"
-            "120,3,0.0625,187,2.5,1,1.04,0.5\n"
-            "131,7,0.333333,0,0,0,1,0\n");
+            "frame,match,score,inliers,angle_deg,accepted,turn_scale,scaled_angle_deg,edges\n"
+            "120,3,0.0625,187,2.5,1,1.04,0.5,2\n"
+            "131,7,0.333333,0,0,0,1,0,0\n");
   WriteLoopsCsv(path, {});
   EXPECT_EQ(ReadWholeFile(path),
-            "frame,match,score,inliers,angle_deg,accepted,turn_scale,scaled_angle_deg\n");
+            "frame,match,score,inliers,angle_deg,accepted,turn_scale,scaled_angle_deg,edges\n");
 }
 
 TEST(LoopsCsv, RefusesNumbersThatAreNotFinite) {
@@ -78,7 +78,7 @@ TEST(LoopsCsv, KeepsTheOldFileWhenItCannotWriteTheNew) {
 TEST(LoopsCsv, ReadsWhatItHasWritten) {
   const TemporaryFolder folder;
   const std::filesystem::path path = folder.path() / "loops.csv";
-  WriteLoopsCsv(path, {{90, 7, 0.5, 123, 1.25, true, 1.002, 0.75}});
+  WriteLoopsCsv(path, {{90, 7, 0.5, 123, 1.25, true, 1.002, 0.75, 3}});
   const std::vector<LoopRow> read = ReadLoopsCsv(path);
   ASSERT_EQ(read.size(), 1u);
   EXPECT_EQ(read[0].frame, 90);
@@ -89,6 +89,7 @@ TEST(LoopsCsv, ReadsWhatItHasWritten) {
   EXPECT_TRUE(read[0].accepted);
   EXPECT_EQ(read[0].turn_scale, 1.002);
   EXPECT_EQ(read[0].scaled_angle_deg, 0.75);
+  EXPECT_EQ(read[0].edges, 3);
 }
 
 }  // namespace

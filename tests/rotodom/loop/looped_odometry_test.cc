@@ -126,11 +126,31 @@ TEST(LoopedOdometry, FindsTheStartAgainAndNothingElse) {
     EXPECT_LT(turn.AngleDeg(), 40.0);  // of 65 deg that the camera sees
     EXPECT_GT(check.score, 0.0);
     EXPECT_LE(check.score, 1.0);
+    EXPECT_GE(check.num_edges, 1);
     const RelativeRotation* edge = run.result.graph.FindEdge(check.match, check.frame);
     ASSERT_NE(edge, nullptr);
     EXPECT_EQ(edge->num_inliers, check.num_inliers);
     EXPECT_LT((edge->j_from_i * turn.Inverse()).AngleDeg(), 0.2);
   }
+}
+
+// No edge says quite the same of smeared corners: none is taken, but the points are the same.
+TEST(LoopedOdometry, JoinsTracksWhereItDoesNotKnowTheTurn) {
+  LoopOptions options;
+  options.verification.max_cycle_deg = 1e-9;
+  options.verification.max_cycle_sigmas = 1e3;
+  const LoopedRun run = Follow(Images(), FewFeatures(), options);
+  const LoopedRun without = Follow(Images(), FewFeatures(), WithoutLoops());
+  EXPECT_FALSE(run.accepted.empty());
+  for (const LoopCheck& check : run.accepted) EXPECT_EQ(check.num_edges, 0);
+  EXPECT_EQ(run.result.graph.edges().size(), without.result.graph.edges().size());
+  std::size_t num_matches = 0;
+  for (const EdgeMatches& matches : run.result.edge_matches) num_matches += matches.pairs.size();
+  for (const EdgeMatches& matches : without.result.edge_matches) {
+    num_matches -= matches.pairs.size();
+  }
+  EXPECT_GT(num_matches, 100U);
+  EXPECT_LT(num_matches, 5000U);
 }
 
 TEST(LoopedOdometry, LeavesWhatIsRight) {

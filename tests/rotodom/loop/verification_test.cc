@@ -85,6 +85,7 @@ struct Case {
   Features view;
   std::vector<Features> old_places;  // the candidate is place 1
   RotationMap cam_from_world;
+  TurningRates rates;
   int num_consistent = 1;
   bool is_way_known = true;
   VerificationOptions options;
@@ -94,8 +95,15 @@ struct Case {
     std::vector<const Features*> places;
     places.reserve(old_places.size());
     for (const Features& place : old_places) places.push_back(&place);
-    return VerifyLoop(
-        view, places, cam_from_world, num_consistent, is_way_known, scene.camera, options, tools);
+    return VerifyLoop(view,
+                      places,
+                      cam_from_world,
+                      rates,
+                      num_consistent,
+                      is_way_known,
+                      scene.camera,
+                      options,
+                      tools);
   }
 
   void Turn(int frame, double angle_deg) {
@@ -413,6 +421,63 @@ TEST(VerifyLoop, ARollingShutterMakesEdgesLessCertain) {
   }
 }
 
+// A place whose cameras rolled while they were exposed: `sigma` times as far as corners are smeared
+// they err along it.
+Case SmearedPlace(double sigma, std::uint64_t seed) {
+  Case c = TruePlace();
+  const Camera& camera = c.scene.camera;
+  const Eigen::Vector3d rate(0.0, 0.0, 3.0);
+  SceneRandom random(seed);
+  const auto smear = [&](Features& features) {
+    for (int n = 0; n < features.size(); ++n) {
+      const Eigen::Vector2d whole_px =
+          SmearOf(camera, features.bearings[n], rate, c.options.smear_s_per_px);
+      features.keypoints_px[n] += random.Normal(sigma) * whole_px;
+      features.bearings[n] = *camera.Unproject(features.keypoints_px[n]);
+    }
+    c.rates[features.frame] = rate;
+  };
+  smear(c.view);
+  for (Features& place : c.old_places) smear(place);
+  return c;
+}
+
+TEST(VerifyLoop, WeighsCornersByTheirSmears) {
+  const auto mean_error_deg = [](double smear_s_per_px) {
+    double sum = 0.0;
+    int count = 0;
+    for (std::uint64_t seed = 1; seed <= 10; ++seed) {
+      Case c = SmearedPlace(0.3, seed);
+      c.options.smear_s_per_px = smear_s_per_px;
+      for (const Connection& connection : c.Verify().connections) {
+        sum += ErrorDeg(c.scene, connection.edge);
+        ++count;
+      }
+    }
+    EXPECT_GE(count, 25) << smear_s_per_px;
+    return sum / count;
+  };
+  EXPECT_LT(mean_error_deg(VerificationOptions{}.smear_s_per_px), 0.85 * mean_error_deg(0.0));
+}
+
+// The places are the same, but not how they are turned against each other.
+TEST(VerifyLoop, EdgesMustSayTheSameOfSmearedCorners) {
+  Case c = SmearedPlace(0.5, 1);
+  ASSERT_EQ(c.Verify().connections.size(), 3U);
+  // Nothing says quite the same; among each other they may differ by their deviations.
+  c.options.max_cycle_deg = 1e-9;
+  c.options.max_cycle_sigmas = 100.0;
+  const LoopEvidence evidence = c.Verify();
+  EXPECT_TRUE(evidence.accepted);
+  EXPECT_TRUE(evidence.connections.empty());
+  EXPECT_EQ(evidence.unproven.size(), 3U);
+  // Nobody asks about cameras that stand still, or of which it is not known.
+  for (auto& [frame, rate] : c.rates) rate *= 0.01;
+  EXPECT_EQ(c.Verify().connections.size(), 3U);
+  c.rates.clear();
+  EXPECT_EQ(c.Verify().connections.size(), 3U);
+}
+
 TEST(VerifyLoop, RefusesUncertainEdges) {
   Case c = TruePlace();
   const LoopEvidence evidence = c.Verify();
@@ -465,6 +530,8 @@ TEST(VerificationOptions, NamesTheFirstFieldOutOfRange) {
   EXPECT_TRUE(
       problem([](Options o) { o.min_inlier_ratio = 1.0; }).starts_with("min_inlier_ratio is 1"));
   EXPECT_TRUE(problem([](Options o) { o.max_sigma_deg = 0.0; }).starts_with("max_sigma_deg is 0"));
+  EXPECT_TRUE(
+      problem([](Options o) { o.smear_s_per_px = -1.0; }).starts_with("smear_s_per_px is -1"));
   EXPECT_TRUE(
       problem([](Options o) { o.max_cycle_deg = -1.0; }).starts_with("max_cycle_deg is -1"));
   EXPECT_TRUE(problem([](Options o) {

@@ -196,5 +196,35 @@ TEST(TangentCovariance, IsTheOneOfNoisyPositions) {
   EXPECT_LT((sum / kDraws - expected).norm(), 0.05 * expected.norm());
 }
 
+TEST(DifferenceCovariance, IsTheOneOfNoisyPositionsInBothImages) {
+  const Eigen::Vector3d f_i = Eigen::Vector3d(0.4, -0.2, 1.0).normalized();
+  const Rotation j_from_i = Rotation::Exp({0.1, -0.2, 0.8});
+  const Eigen::Vector3d f_j = j_from_i * f_i;
+  Eigen::Matrix2d C_i;
+  C_i << 2.0, 0.5, 0.5, 0.3;
+  Eigen::Matrix2d C_j;
+  C_j << 0.4, -0.2, -0.2, 1.0;
+  std::mt19937_64 random(1);
+  std::normal_distribution<double> normal;
+  constexpr int kDraws = 20000;
+  constexpr double kSigma = 1e-4;
+  const auto noisy = [&](const Eigen::Vector3d& bearing, const Eigen::Matrix2d& covariance) {
+    const Eigen::Matrix2d L = covariance.llt().matrixL();
+    const Eigen::Vector2d offset = kSigma * L * Eigen::Vector2d(normal(random), normal(random));
+    const Eigen::Vector3d point =
+        bearing / bearing.z() + Eigen::Vector3d(offset.x(), offset.y(), 0.0);
+    return Eigen::Vector3d(point.normalized());
+  };
+  const Eigen::Matrix<double, 3, 2> basis = TangentBasis(f_j);
+  Eigen::Matrix2d sum = Eigen::Matrix2d::Zero();
+  for (int k = 0; k < kDraws; ++k) {
+    const Eigen::Vector2d difference =
+        basis.transpose() * (j_from_i * noisy(f_i, C_i) - noisy(f_j, C_j)) / kSigma;
+    sum += difference * difference.transpose();
+  }
+  const Eigen::Matrix2d expected = DifferenceCovariance(f_i, C_i, f_j, C_j, j_from_i.Matrix());
+  EXPECT_LT((sum / kDraws - expected).norm(), 0.05 * expected.norm());
+}
+
 }  // namespace
 }  // namespace rotslam

@@ -54,6 +54,16 @@ TEST(RatesOf, AreNotKnownBetweenStills) {
   EXPECT_EQ(RatesOf(turn, with_gap).size(), 4U);
 }
 
+TEST(SmearOf, GrowsWithTheTurnWithoutBound) {
+  const Camera camera = PinholeOf500();
+  const Eigen::Vector3d ahead = Eigen::Vector3d::UnitZ();
+  const Eigen::Vector2d slow = SmearOf(camera, ahead, {0.0, 1.0, 0.0}, 0.004);
+  EXPECT_NEAR(slow.x(), 2.0, 1e-3);
+  EXPECT_NEAR(slow.y(), 0.0, 1e-9);
+  EXPECT_NEAR(SmearOf(camera, ahead, {0.0, 10.0, 0.0}, 0.004).x(), 20.0, 1e-2);
+  EXPECT_EQ(SmearOf(camera, -ahead, {0.0, 1.0, 0.0}, 0.004), Eigen::Vector2d::Zero());
+}
+
 TEST(SetSmears, FollowsWhatTheImageDoes) {
   const Camera camera = PinholeOf500();
   const Eigen::Vector3d rate(0.0, 0.9, 0.5);
