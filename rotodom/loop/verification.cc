@@ -348,9 +348,9 @@ LoopEvidence VerifyLoop(const Features& view,
   for (const int index : agreeing) {
     if (!opinions[index].is_certain) break;
     if (is_proven[index]) {
-      evidence.connections.push_back(*opinions[index].smeared);
+      evidence.connections.push_back(*std::move(opinions[index].smeared));
     } else {
-      evidence.unproven.push_back(opinions[index].connection);
+      evidence.unproven.push_back(std::move(opinions[index].connection));
     }
   }
   return evidence;
