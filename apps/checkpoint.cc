@@ -23,7 +23,7 @@ namespace {
 namespace fs = std::filesystem;
 
 // Changes with what is written.
-constexpr std::string_view kMagic = "rotslam checkpoint 4\n";
+constexpr std::string_view kMagic = "rotslam checkpoint 5\n";
 
 std::string Hex(std::uint64_t number) {
   std::array<char, 17> text = {};

@@ -238,6 +238,7 @@ Orientations FindOrientations(Input& input,
   orientations.num_places = odometry.num_places();
   if (keep_features)
     orientations.places = DoubtfulPlaces(odometry.TakePlaces(), orientations.loops);
+  orientations.exposure_s = odometry.exposure_s();
   orientations.seconds = odometry.odometry_seconds();
   orientations.loop_seconds = odometry.loop_seconds();
   orientations.global_averaging_seconds = odometry.averaging_seconds();

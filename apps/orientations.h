@@ -37,6 +37,7 @@ struct Orientations : OdometryResult {
   // With features kept: described corners of the places that looked like others but are not known
   // to be the same, and of those around them.
   std::map<FrameId, Features> places;
+  double exposure_s = 0.0;  // what blur tells of it at the end; 0: nothing
   OdometrySeconds seconds;
   LoopSeconds loop_seconds;
   double global_averaging_seconds = 0.0;

@@ -354,7 +354,8 @@ RunSummary StartSummary(const std::string& command,
   }
   summary.rotodom = SummaryTable{
       {"mean_inliers_per_edge", inliers / static_cast<double>(orientations.graph.edges().size())},
-      {"rotation_only_edges", rotation_only}};
+      {"rotation_only_edges", rotation_only},
+      {"exposure_s", orientations.exposure_s}};
   if (orientations.given) {
     summary.sequence.emplace_back("rotations_file", orientations.given->file);
     summary.rotodom->emplace_back("given_disagreement_deg", orientations.given->disagreement_deg);

@@ -4,6 +4,8 @@
 #include <iterator>
 #include <stdexcept>
 
+#include "rotodom/tracking/blur.h"
+#include "rotodom/tracking/smear.h"
 #include "rotodom/types/options.h"
 #include "rotodom/types/stopwatch.h"
 
@@ -115,6 +117,7 @@ FrameEstimate RotationalOdometry::AddFrame(FrameId frame,
                               estimate.cam_from_world,
                               NewestMotion(timestamp_s, estimate.cam_from_world),
                               nullptr,
+                              exposure_.Seconds(),
                               options_.features.max_features};
   const TrackingResult tracked = Track(recent, target, estimate);
   CarryOn(tracked, recent, *view);
@@ -129,6 +132,7 @@ FrameEstimate RotationalOdometry::AddFrame(FrameId frame,
   KeepGoodConnections(estimate);
   AverageWindow(estimate);
   UpdateCovariance(estimate);
+  MeasureExposure();
   Forget();
   UpdateFlow(tracked, recent, *view);
 
@@ -440,6 +444,31 @@ std::optional<Eigen::Matrix3d> RotationalOdometry::CovarianceOf(FrameId frame) c
 
 std::optional<Eigen::Matrix3d> RotationalOdometry::CovarianceBetween(FrameId i, FrameId j) const {
   return UnlessUnknown(covariance_.Between(i, j));
+}
+
+void RotationalOdometry::MeasureExposure() {
+  if (!options_.tracking.match_blur || recent_.empty()) return;
+  const Stopwatch stopwatch(seconds_.tracking);
+  const auto time_s = [&](FrameId frame) { return timestamps_s_.at(frame); };
+  const auto turning = [&](const View& view) -> std::optional<TurningView> {
+    const FrameId frame = view.features.frame;
+    const auto rate = RateOf(frame, cam_from_world_, time_s, kFarthestFrameForBlur_s);
+    if (!rate) return std::nullopt;
+    return TurningView{{&view, cam_from_world_.at(frame)}, *rate};
+  };
+  const auto newest = turning(*recent_.front());
+  if (!newest) return;
+  std::optional<TurningView> most_different;
+  double largest = 0.0;
+  for (const std::shared_ptr<View>& view : recent_) {
+    const auto other = turning(*view);
+    if (!other || !ExposureMeter::Tells(other->rate, newest->rate, camera_.MeanFocal())) continue;
+    const double difference = std::abs(other->rate.norm() - newest->rate.norm());
+    if (difference <= largest) continue;
+    largest = difference;
+    most_different = other;
+  }
+  if (most_different) exposure_.Add(camera_, *most_different, *newest, num_threads_);
 }
 
 void RotationalOdometry::Forget() {

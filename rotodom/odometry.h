@@ -11,6 +11,7 @@
 
 #include "rotodom/averaging/averaging.h"
 #include "rotodom/averaging/orientation_covariance.h"
+#include "rotodom/tracking/exposure.h"
 #include "rotodom/tracking/recovery.h"
 #include "rotodom/tracking/shutter.h"
 #include "rotodom/tracking/tracking.h"
@@ -52,7 +53,7 @@ struct FrameReport {
 /// Where the time goes, seconds since the start.
 struct OdometrySeconds {
   double pyramid = 0.0;
-  double tracking = 0.0;  // recovery included
+  double tracking = 0.0;  // recovery and the time of exposure included
   double detection = 0.0;
   double edges = 0.0;  // relative rotations
   double averaging = 0.0;
@@ -111,6 +112,9 @@ class RotationalOdometry {
 
   const OdometrySeconds& seconds() const { return seconds_; }
 
+  /// What the images of late tell of their time of exposure, as ExposureMeter::Seconds().
+  double exposure_s() const { return exposure_.Seconds(); }
+
   /// Covariance of a frame that is still in the window, as in FrameEstimate.
   std::optional<Eigen::Matrix3d> CovarianceOf(FrameId frame) const;
 
@@ -153,6 +157,8 @@ class RotationalOdometry {
   void KeepGoodConnections(FrameEstimate& estimate) const;
   void AverageWindow(FrameEstimate& estimate);
   void UpdateCovariance(FrameEstimate& estimate);
+  // By the newest of the older views, whose rate is known from both sides, and one of those before.
+  void MeasureExposure();
   // Drops what no later frame can refer to.
   void Forget();
   void UpdateFlow(const TrackingResult& tracked,
@@ -175,6 +181,7 @@ class RotationalOdometry {
   OrientationCovariance covariance_;
   OdometrySeconds seconds_;
   int next_track_ = 0;
+  ExposureMeter exposure_;
 };
 
 /// What is known of a sequence: the frames' estimates put together.

@@ -28,7 +28,7 @@ void RotationalOdometry::Transfer(Archive& archive) {
       view->pyramid = BuildPyramid(image, options_.features);
     }
   }
-  archive(graph_, cam_from_world_, timestamps_s_, covariance_, seconds_, next_track_);
+  archive(graph_, cam_from_world_, timestamps_s_, covariance_, seconds_, next_track_, exposure_);
 }
 
 std::string RotationalOdometry::SaveState() {

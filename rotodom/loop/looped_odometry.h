@@ -70,6 +70,7 @@ class LoopedOdometry {
   const OdometryResult& result() const { return orientations_.result(); }
   OdometryResult&& TakeResult() { return orientations_.TakeResult(); }
 
+  double exposure_s() const { return odometry_.exposure_s(); }
   const OdometrySeconds& odometry_seconds() const { return odometry_.seconds(); }
   LoopSeconds loop_seconds() const { return closure_ ? closure_->seconds() : LoopSeconds{}; }
   double averaging_seconds() const { return orientations_.averaging_seconds(); }

@@ -4,13 +4,9 @@
 #include <cmath>
 #include <iterator>
 
-#include "rotodom/tracking/shutter.h"
-
 namespace rotslam {
 namespace {
 
-// Farther apart in time frames are no video.
-constexpr double kFarthestNeighbour_s = 0.15;
 // What is smeared more is not found again, or not taken for the same.
 constexpr double kLongestSmear = 1.4;
 // Over which the image's speed is worked out.
@@ -18,20 +14,40 @@ constexpr double kShortTime_s = 1e-3;
 
 }  // namespace
 
+std::optional<Eigen::Vector3d> RateThrough(const TimedOrientation& frame,
+                                           std::span<const TimedOrientation> others,
+                                           double farthest_s) {
+  constexpr std::size_t kMostOthers = 2;
+  const auto distance_s = [&](const TimedOrientation& other) {
+    return std::abs(other.time_s - frame.time_s);
+  };
+  std::vector<TimedOrientation> nearest;
+  for (const TimedOrientation& other : others) {
+    if (other.time_s != frame.time_s && distance_s(other) <= farthest_s) {
+      nearest.push_back(other);
+    }
+  }
+  if (nearest.empty()) return std::nullopt;
+  std::stable_sort(nearest.begin(), nearest.end(), [&](const auto& a, const auto& b) {
+    return distance_s(a) < distance_s(b);
+  });
+  if (nearest.size() > kMostOthers) nearest.resize(kMostOthers);
+  return MotionThrough(frame, nearest).coefficients.col(0);
+}
+
 std::optional<Eigen::Vector3d> RateOf(FrameId frame,
                                       const RotationMap& cam_from_world,
-                                      const std::function<double(FrameId)>& time_s) {
+                                      const std::function<double(FrameId)>& time_s,
+                                      double farthest_s) {
   const auto here = cam_from_world.find(frame);
   if (here == cam_from_world.end()) return std::nullopt;
   std::vector<TimedOrientation> others;
   const auto add = [&](RotationMap::const_iterator other) {
-    if (std::abs(time_s(other->first) - time_s(frame)) > kFarthestNeighbour_s) return;
     others.push_back({time_s(other->first), other->second});
   };
   if (here != cam_from_world.begin()) add(std::prev(here));
   if (std::next(here) != cam_from_world.end()) add(std::next(here));
-  if (others.empty()) return std::nullopt;
-  return MotionThrough({time_s(frame), here->second}, others).coefficients.col(0);
+  return RateThrough({time_s(frame), here->second}, others, farthest_s);
 }
 
 TurningRates RatesOf(const RotationMap& cam_from_world,

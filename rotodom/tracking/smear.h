@@ -3,11 +3,13 @@
 #include <functional>
 #include <map>
 #include <optional>
+#include <span>
 #include <vector>
 
 #include <Eigen/Core>
 
 #include "rotodom/camera/camera.h"
+#include "rotodom/tracking/shutter.h"
 #include "rotodom/types/maps.h"
 #include "rotodom/types/track.h"
 
@@ -16,13 +18,24 @@ namespace rotslam {
 /// How fast frames turn, rad/s in camera axes.
 using TurningRates = std::map<FrameId, Eigen::Vector3d>;
 
-/// The rate through the orientations next to a frame.
+/// Farther apart in time frames are no video: of stills nobody knows how they turned while they
+/// were exposed.
+inline constexpr double kFarthestFrame_s = 0.15;
+
+/// The rate through a frame's orientation and the two of others that are nearest in time.
+/// @param others      at different times; that of the frame itself does not count.
+/// @param farthest_s  nor do those farther away.
+/// @return  nullopt where none of them counts.
+std::optional<Eigen::Vector3d> RateThrough(const TimedOrientation& frame,
+                                           std::span<const TimedOrientation> others,
+                                           double farthest_s = kFarthestFrame_s);
+
+/// The same through the orientations next to a frame.
 /// @param time_s  of each frame; ascending.
-/// @return  nullopt where none of them is within 0.15 s: of stills nobody knows how they turned
-///          while they were exposed.
 std::optional<Eigen::Vector3d> RateOf(FrameId frame,
                                       const RotationMap& cam_from_world,
-                                      const std::function<double(FrameId)>& time_s);
+                                      const std::function<double(FrameId)>& time_s,
+                                      double farthest_s = kFarthestFrame_s);
 
 /// Those of all frames that have one.
 TurningRates RatesOf(const RotationMap& cam_from_world,

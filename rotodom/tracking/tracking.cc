@@ -2,12 +2,15 @@
 
 #include <algorithm>
 #include <cmath>
+#include <iterator>
 #include <stdexcept>
 
 #include <Eigen/Dense>
 
 #include "rotodom/relative_rotation/normal_epipolar.h"
+#include "rotodom/tracking/blur.h"
 #include "rotodom/tracking/patch_alignment.h"
+#include "rotodom/tracking/smear.h"
 #include "rotodom/types/median.h"
 #include "rotodom/types/options.h"
 #include "rotodom/types/parallel.h"
@@ -27,6 +30,8 @@ constexpr double kFlowThatShowsPx = 2.0;
 // Distance from the epipole, in focal lengths, of a point whose patch is stretched and sheared as
 // much as is usual: by flow over distance.
 constexpr double kDepthScale = 0.15;
+// Streaks that differ by less do not show.
+constexpr double kStreakThatShowsPx = 0.5;
 constexpr int kPatchBorderPx = 6;
 
 struct Candidate {
@@ -88,6 +93,7 @@ class Search {
       target_from_view_.push_back(cam_from_world * view.cam_from_world.Inverse());
       turns_patches_.push_back(target_from_view_.back().AngleDeg() > kTurnThatShowsDeg);
     }
+    if (target_.exposure_s > 0.0) SetRates(cam_from_world);
   }
 
   // Where the point should show; nullopt outside the image.
@@ -177,22 +183,80 @@ class Search {
     return *corrected;
   }
 
-  std::optional<Location> Align(
-      int view_index, int index, int level, const Eigen::Vector2d& px, double reach_px) const {
+  void SetRates(const Rotation& cam_from_world) {
+    std::vector<TimedOrientation> all = {{target_.timestamp_s, cam_from_world}};
+    for (const OrientedView& view : views_) {
+      all.push_back({view.view->timestamp_s, view.cam_from_world});
+    }
+    const auto rate_of = [&](const TimedOrientation& frame) {
+      return RateThrough(frame, all, kFarthestFrameForBlur_s);
+    };
+    target_rate_ = rate_of(all.front());
+    view_rates_.clear();
+    std::transform(all.begin() + 1, all.end(), std::back_inserter(view_rates_), rate_of);
+  }
+
+  // How far a point moves in either image while that is exposed, in pixels.
+  struct Streaks {
+    Eigen::Vector2d in_view;
+    Eigen::Vector2d in_target;
+  };
+
+  // nullopt where both are smeared alike, or nobody knows.
+  std::optional<Streaks> StreaksOf(int view_index,
+                                   int index,
+                                   const Eigen::Matrix2d& target_from_view_px) const {
+    if (!target_rate_ || !view_rates_[view_index]) return std::nullopt;
+    const Eigen::Vector3d& bearing = views_[view_index].view->features.bearings[index];
+    const Streaks streaks{
+        SmearOf(camera_, bearing, *view_rates_[view_index], target_.exposure_s),
+        SmearOf(
+            camera_, target_from_view_[view_index] * bearing, *target_rate_, target_.exposure_s)};
+    const Eigen::Vector2d turned = target_from_view_px * streaks.in_view;
+    const double difference =
+        std::min((turned - streaks.in_target).norm(), (turned + streaks.in_target).norm());
+    if (!(difference > kStreakThatShowsPx)) return std::nullopt;
+    return streaks;
+  }
+
+  bool IsAlike(const std::optional<PatchAlignment>& found) const {
+    return found && found->correlation >= options_.min_correlation;
+  }
+
+  // In pixels of the level.
+  std::optional<PatchAlignment> AlignAtLevel(int view_index,
+                                             int index,
+                                             int level,
+                                             const Eigen::Vector2d& start_px,
+                                             double reach_px) const {
     const View& view = *views_[view_index].view;
+    const cv::Mat& image = view.pyramid.levels[level];
+    const cv::Mat& target = target_.pyramid->levels[level];
+    const Eigen::Vector2d center_px =
+        view.pyramid.ToLevel(view.features.keypoints_px[index], level);
     const Eigen::Matrix2d warp =
         turns_patches_[view_index]
             ? PatchWarp(camera_, view.features.bearings[index], target_from_view_[view_index])
             : Eigen::Matrix2d(Eigen::Matrix2d::Identity());
-    const auto patch =
-        PatchTemplate::Sample(view.pyramid.levels[level],
-                              view.pyramid.ToLevel(view.features.keypoints_px[index], level),
-                              warp);
+    if (const auto streaks = StreaksOf(view_index, index, warp)) {
+      const auto to_level = target_.pyramid->scales[level].cwiseInverse().asDiagonal();
+      return AlignBlurredPatch({image, center_px, warp, to_level * streaks->in_view},
+                               target,
+                               start_px,
+                               to_level * streaks->in_target,
+                               reach_px);
+    }
+    const auto patch = PatchTemplate::Sample(image, center_px, warp);
     if (!patch) return std::nullopt;
-    auto found = AlignPatch(
-        *patch, target_.pyramid->levels[level], target_.pyramid->ToLevel(px, level), reach_px);
-    if (!found || found->correlation < options_.min_correlation) return std::nullopt;
-    if (level == 0) found = Unbend(*patch, view_index, index, *found);
+    const auto found = AlignPatch(*patch, target, start_px, reach_px);
+    return level == 0 && IsAlike(found) ? Unbend(*patch, view_index, index, *found) : found;
+  }
+
+  std::optional<Location> Align(
+      int view_index, int index, int level, const Eigen::Vector2d& px, double reach_px) const {
+    const auto found =
+        AlignAtLevel(view_index, index, level, target_.pyramid->ToLevel(px, level), reach_px);
+    if (!IsAlike(found)) return std::nullopt;
     const Eigen::Matrix2d scale = target_.pyramid->scales[level].asDiagonal();
     return Location{target_.pyramid->ToImage(found->center_px, level),
                     scale * found->covariance * scale};
@@ -206,6 +270,9 @@ class Search {
   int middle_ = 0;
   std::vector<Rotation> target_from_view_;
   std::vector<bool> turns_patches_;
+  // Where exposure matters and they are known, rad/s.
+  std::optional<Eigen::Vector3d> target_rate_;
+  std::vector<std::optional<Eigen::Vector3d>> view_rates_;
 };
 
 // The turn of the camera that most of the probes show beside the expected one.

@@ -29,6 +29,9 @@ struct TrackingOptions {
   // was wrong and the frame is matched by descriptors.
   int min_points = 150;
   double min_found_ratio = 0.3;
+  // Where the camera turns faster in one of two images than in the other, patches are sought with
+  // both smeared alike, by the time of exposure that the images tell.
+  bool match_blur = true;
 
   std::optional<std::string> Problem() const;
 
@@ -39,6 +42,7 @@ struct TrackingOptions {
     visit("num_references", num_references);
     visit("min_points", min_points);
     visit("min_found_ratio", min_found_ratio);
+    visit("match_blur", match_blur);
   }
 };
 
@@ -51,6 +55,9 @@ struct TrackingTarget {
   AngularMotion motion;
   // When given, the motion beside the rotation; otherwise each point goes on with its own.
   const FlowField* flow = nullptr;
+  // Of the target and the views; where they turned at different rates, that much more of the one
+  // is smeared. 0: nothing is.
+  double exposure_s = 0.0;
   // Points beyond this number that are not in the newest view are not looked for.
   int max_points = 2000;
 };

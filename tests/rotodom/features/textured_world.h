@@ -44,7 +44,25 @@ class TexturedWorld {
     return ViewByRow(camera, [&](int) { return cam_from_world; });
   }
 
-  /// The same where each row has an orientation of its own: cam_from_world(row).
+  /// What it sees on average while it is exposed, halfway at time_s.
+  /// @param cam_from_world  of the time.
+  template <class Motion>
+  cv::Mat ExposedView(const Camera& camera,
+                      const Motion& cam_from_world,
+                      double time_s,
+                      double exposure_s) const {
+    constexpr int kSamples = 24;
+    cv::Mat sum(camera.height, camera.width, CV_32F, cv::Scalar(0.0));
+    for (int k = 0; k < kSamples; ++k) {
+      const double late = (k + 0.5) / kSamples - 0.5;
+      cv::accumulate(View(camera, cam_from_world(time_s + late * exposure_s)), sum);
+    }
+    cv::Mat view;
+    sum.convertTo(view, CV_8U, 1.0 / kSamples);
+    return view;
+  }
+
+  /// The same as View where each row has an orientation of its own: cam_from_world(row).
   template <class OrientationOfRow>
   cv::Mat ViewByRow(const Camera& camera, const OrientationOfRow& cam_from_world) const {
     cv::Mat x(camera.height, camera.width, CV_32F);

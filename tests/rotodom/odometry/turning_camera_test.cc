@@ -297,5 +297,72 @@ TEST(RollingShutter, SameBytesAtAnyThreadCount) {
   }
 }
 
+// Stands, turns away by 36 deg in half a second, and stands: up to 470 px/s.
+Rotation LookAside(double time_s) {
+  const double share = std::clamp((time_s - 0.2) / 0.5, 0.0, 1.0);
+  return TurnDeg(0.0, 36.0 * share * share * (3.0 - 2.0 * share) - 18.0, 0.0);
+}
+
+constexpr double kExposureS = 0.02;
+
+// 9 px of blur at the fastest.
+const std::vector<cv::Mat>& BlurredFilm() {
+  static const std::vector<cv::Mat> film = [] {
+    const TexturedWorld world;
+    std::vector<cv::Mat> images;
+    for (int k = 0; k < 27; ++k) {
+      images.push_back(world.ExposedView(SmallCamera(), LookAside, k / kFps, kExposureS));
+    }
+    return images;
+  }();
+  return film;
+}
+
+double TurnedShare(const OdometryResult& result) {
+  const std::vector<RelativeRotation>& edges = result.graph.edges();
+  const auto turned = std::count_if(
+      edges.begin(), edges.end(), [](const RelativeRotation& edge) { return edge.rotation_only; });
+  return static_cast<double>(turned) / static_cast<double>(edges.size());
+}
+
+TEST(Blur, IsNoMovementWhereBothImagesAreSmearedAlike) {
+  OdometryOptions as_they_are = FewFeatures();
+  as_they_are.tracking.match_blur = false;
+  const OdometryResult smeared = Collect(Follow(BlurredFilm(), 0.0, as_they_are));
+  const OdometryResult alike = Collect(Follow(BlurredFilm()));
+  const double smeared_deg = RelativeErrorDeg(smeared.cam_from_world, LookAside, 1);
+  const double alike_deg = RelativeErrorDeg(alike.cam_from_world, LookAside, 1);
+  RecordProperty("deg", std::to_string(smeared_deg) + " -> " + std::to_string(alike_deg));
+  RecordProperty(
+      "turned", std::to_string(TurnedShare(smeared)) + " -> " + std::to_string(TurnedShare(alike)));
+  EXPECT_LT(TurnedShare(smeared), 0.7);
+  EXPECT_GT(TurnedShare(alike), 0.95);
+  EXPECT_LT(alike_deg, 0.5 * smeared_deg);
+}
+
+TEST(Blur, TellsTheTimeOfExposure) {
+  RotationalOdometry odometry(SmallCamera(), FewFeatures(), 1, 1);
+  for (int k = 0; k < 27; ++k) odometry.AddFrame(FrameId{k}, k / kFps, BlurredFilm()[k]);
+  EXPECT_NEAR(odometry.exposure_s(), kExposureS, 0.002);
+  RotationalOdometry sharp(SmallCamera(), FewFeatures(), 1, 1);
+  const std::vector<cv::Mat> film = Film(LookAside, 27);
+  for (int k = 0; k < 27; ++k) sharp.AddFrame(FrameId{k}, k / kFps, film[k]);
+  EXPECT_EQ(sharp.exposure_s(), 0.0);
+}
+
+TEST(Blur, IsRememberedInTheState) {
+  RotationalOdometry odometry(SmallCamera(), FewFeatures(), 1, 1);
+  for (int k = 0; k < 13; ++k) odometry.AddFrame(FrameId{k}, k / kFps, BlurredFilm()[k]);
+  EXPECT_GT(odometry.exposure_s(), 0.0);
+  RotationalOdometry resumed(SmallCamera(), FewFeatures(), 1, 1);
+  resumed.RestoreState(odometry.SaveState());
+  EXPECT_EQ(resumed.exposure_s(), odometry.exposure_s());
+  for (int k = 13; k < 17; ++k) {
+    const FrameEstimate a = odometry.AddFrame(FrameId{k}, k / kFps, BlurredFilm()[k]);
+    const FrameEstimate b = resumed.AddFrame(FrameId{k}, k / kFps, BlurredFilm()[k]);
+    EXPECT_EQ(a.features.keypoints_px, b.features.keypoints_px) << "frame " << k;
+  }
+}
+
 }  // namespace
 }  // namespace rotslam

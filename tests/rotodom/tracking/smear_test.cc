@@ -54,6 +54,18 @@ TEST(RatesOf, AreNotKnownBetweenStills) {
   EXPECT_EQ(RatesOf(turn, with_gap).size(), 4U);
 }
 
+TEST(RateThrough, TakesTheTwoNearest) {
+  const auto at = [](double time_s) {
+    return TimedOrientation{time_s, Rotation::Exp({0.0, 0.5 * 6.0 * time_s * time_s, 0.0})};
+  };
+  // A parabola goes through three; what is far away in time, and the frame itself, do not count.
+  const auto rate = RateThrough(
+      at(0.1), std::vector<TimedOrientation>{at(0.1), at(0.06), at(0.02), at(0.0), at(0.5)});
+  ASSERT_TRUE(rate);
+  EXPECT_NEAR(rate->y(), 0.6, 1e-9);
+  EXPECT_FALSE(RateThrough(at(0.1), std::vector<TimedOrientation>{at(0.1), at(0.5)}));
+}
+
 TEST(SmearOf, GrowsWithTheTurnWithoutBound) {
   const Camera camera = PinholeOf500();
   const Eigen::Vector3d ahead = Eigen::Vector3d::UnitZ();

@@ -7,7 +7,7 @@
 
 #include <gtest/gtest.h>
 
-#include "tests/rotodom/tracking/world_views.h"
+#include "tests/rotodom/tracking/turning_views.h"
 #include "tests/scenes/scene.h"
 
 namespace rotslam {
@@ -404,6 +404,28 @@ TEST(TrackingOptions, NamesTheFirstFieldOutOfRange) {
   TrackingOptions bad;
   bad.num_probes = 0;
   EXPECT_THROW(TrackPoints({}, {}, SmallCamera(), bad, 1), std::invalid_argument);
+}
+
+// Four views before the target tell how fast it turns; nobody tells the tracker.
+TEST(TrackPoints, SeeksPointsOfASharpViewInABlurredOne) {
+  constexpr double kExposureS = 0.02;
+  const FilmedStart film = FilmStart(Start({2.0, 10.0, 4.0}), 6, kExposureS);
+  std::vector<OrientedView> views;
+  for (int k = 4; k >= 0; --k) views.push_back({&film.views[k], film.cam_from_world[k]});
+  TrackingTarget target = TargetAt(film.views[5].pyramid, film.cam_from_world[5]);
+  target.timestamp_s = film.views[5].timestamp_s;
+  const auto errors_px = [&](double exposure_s) {
+    target.exposure_s = exposure_s;
+    return ErrorsPx(
+        TrackPoints(views, target, SmallCamera(), {}, 1), views, film.cam_from_world[5]);
+  };
+  const std::vector<double> smeared = errors_px(0.0);
+  const std::vector<double> alike = errors_px(kExposureS);
+  Record("median_px", Quantile(smeared, 0.5));
+  Record("median_alike_px", Quantile(alike, 0.5));
+  EXPECT_GT(static_cast<double>(alike.size()), 0.98 * static_cast<double>(smeared.size()));
+  EXPECT_LT(Quantile(alike, 0.5), 0.5 * Quantile(smeared, 0.5));
+  EXPECT_LT(Quantile(alike, 0.9), 0.5 * Quantile(smeared, 0.9));
 }
 
 }  // namespace
