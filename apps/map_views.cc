@@ -7,6 +7,8 @@
 #include <vector>
 
 #include "apps/placement.h"
+#include "rotodom/tracking/blur.h"
+#include "rotodom/tracking/smear.h"
 
 namespace rotslam {
 namespace {
@@ -17,6 +19,15 @@ std::array<FrameId, 2> NextTo(FrameId frame, const RotationMap& cam_from_world) 
   if (!cam_from_world.contains(FrameId{value - 1})) return {FrameId{value + 1}, FrameId{value + 2}};
   if (!cam_from_world.contains(FrameId{value + 1})) return {FrameId{value - 1}, FrameId{value - 2}};
   return {FrameId{value - 1}, FrameId{value + 1}};
+}
+
+void SetTurnsWhileExposed(const Orientations& orientations, MapViews& views) {
+  if (!(orientations.exposure_s > 0.0)) return;
+  const auto time_s = [&](FrameId id) { return orientations.timestamps_s[id.value]; };
+  for (auto& [frame, view] : views) {
+    const auto rate = RateOf(frame, orientations.cam_from_world, time_s, kFarthestFrameForBlur_s);
+    if (rate) view.turn_while_exposed = orientations.exposure_s * *rate;
+  }
 }
 
 }  // namespace
@@ -50,6 +61,7 @@ MapViews ReadMapViews(const std::string& path,
 }
 
 void SetMotions(const MotionSources& sources, const Reconstruction& map, MapViews& views) {
+  SetTurnsWhileExposed(sources.orientations, views);
   if (sources.camera.readout_s == 0.0) return;
   const RotationMap& cam_from_world = sources.orientations.cam_from_world;
   const auto time_s = [&](FrameId id) { return sources.orientations.timestamps_s[id.value]; };

@@ -32,7 +32,8 @@ struct MotionSources {
 
 /// Gives the views the motion that a rolling shutter sees: the turn and the velocity through the
 /// frames before and behind each, which are placed by the map's points. Where they cannot be, the
-/// turn is the odometry's and the velocity 0. Nothing happens with a global shutter.
+/// turn is the odometry's and the velocity 0. With a global shutter there is neither. And the turn
+/// that smears the image, where that tells how long it was exposed.
 void SetMotions(const MotionSources& sources, const Reconstruction& map, MapViews& views);
 
 /// Described corners of the views, where a global shutter would see them.

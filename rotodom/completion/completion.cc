@@ -10,7 +10,9 @@
 #include <opencv2/imgproc.hpp>
 
 #include "rotodom/features/features.h"
+#include "rotodom/tracking/blur.h"
 #include "rotodom/tracking/patch_alignment.h"
+#include "rotodom/tracking/smear.h"
 #include "rotodom/types/options.h"
 #include "rotodom/types/parallel.h"
 
@@ -32,6 +34,14 @@ struct Place {
   Eigen::Vector2d image_px;      // in the image
   Eigen::Vector3d in_cam;        // when its row is exposed
   Rotation cam_from_world;       // then
+  Eigen::Vector2d streak_px;     // how far it moves in the image while that is exposed
+};
+
+// A part of one image, sought in another.
+struct SoughtPatch {
+  const cv::Mat& image;
+  Eigen::Vector2d center_px;
+  Eigen::Vector2d streak_px;
 };
 
 double AngleRad(const Eigen::Vector3d& a, const Eigen::Vector3d& b) {
@@ -142,7 +152,10 @@ class Completion {
     const auto px = camera_.Project(place.in_cam);
     if (!px) return std::nullopt;
     place.mid_frame_px = place.image_px = *px;
-    if (camera_.readout_s == 0.0) return place;
+    if (camera_.readout_s == 0.0) {
+      place.streak_px = StreakOf(view, place);
+      return place;
+    }
     // The pixel decides on the pose, which decides on the pixel.
     for (int k = 0; k < 2; ++k) {
       const double late_s = camera_.ExposureTime(place.image_px);
@@ -153,7 +166,28 @@ class Completion {
       if (!late_px) return std::nullopt;
       place.image_px = *late_px;
     }
+    place.streak_px = StreakOf(view, place);
     return place;
+  }
+
+  Eigen::Vector2d StreakOf(const PosedView& view, const Place& place) const {
+    return SmearOf(camera_, place.in_cam.normalized(), view.view->turn_while_exposed, 1.0);
+  }
+
+  // Where the other image shows the patch, both as much smeared as they are together.
+  std::optional<PatchAlignment> Align(const SoughtPatch& patch,
+                                      const Eigen::Matrix2d& warp,
+                                      const SoughtPatch& in) const {
+    if (!AreSmearedAlike(warp, patch.streak_px, in.streak_px)) {
+      return AlignBlurredPatch({patch.image, patch.center_px, warp, patch.streak_px},
+                               in.image,
+                               in.center_px,
+                               in.streak_px,
+                               options_.reach_px);
+    }
+    const auto sampled = PatchTemplate::Sample(patch.image, patch.center_px, warp);
+    if (!sampled) return std::nullopt;
+    return AlignPatch(*sampled, in.image, in.center_px, options_.reach_px);
   }
 
   bool IsInside(const Eigen::Vector2d& px) const {
@@ -207,14 +241,12 @@ class Completion {
       const auto rough = AlignPatch(*half, target.view->half, HalfPx(px), kHalfReachPx);
       if (rough && rough->correlation >= options_.min_correlation) px = FullPx(rough->center_px);
     }
-    const auto patch = PatchTemplate::Sample(source.view->image, source_px, *warp);
-    if (!patch) return std::nullopt;
-    const auto found = AlignPatch(*patch, target.view->image, px, options_.reach_px);
+    const SoughtPatch patch{source.view->image, source_px, here.streak_px};
+    const auto found = Align(patch, *warp, {target.view->image, px, there->streak_px});
     if (!found || found->correlation < options_.min_correlation) return std::nullopt;
     if ((found->center_px - there->image_px).norm() > options_.reach_px) return std::nullopt;
-    const auto back = PatchTemplate::Sample(target.view->image, found->center_px, warp->inverse());
-    if (!back) return std::nullopt;
-    const auto returned = AlignPatch(*back, source.view->image, source_px, options_.reach_px);
+    const auto returned =
+        Align({target.view->image, found->center_px, there->streak_px}, warp->inverse(), patch);
     if (!returned || (returned->center_px - source_px).norm() > options_.max_return_px) {
       return std::nullopt;
     }

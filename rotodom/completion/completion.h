@@ -54,6 +54,9 @@ struct MapView {
   // second.
   AngularMotion motion;
   Eigen::Vector3d velocity = Eigen::Vector3d::Zero();
+  // How far the camera turned while one row was exposed, rad in camera axes; zero: sharp, or not
+  // known.
+  Eigen::Vector3d turn_while_exposed = Eigen::Vector3d::Zero();
 };
 using MapViews = std::map<FrameId, MapView>;
 

@@ -30,8 +30,6 @@ constexpr double kFlowThatShowsPx = 2.0;
 // Distance from the epipole, in focal lengths, of a point whose patch is stretched and sheared as
 // much as is usual: by flow over distance.
 constexpr double kDepthScale = 0.15;
-// Streaks that differ by less do not show.
-constexpr double kStreakThatShowsPx = 0.5;
 constexpr int kPatchBorderPx = 6;
 
 struct Candidate {
@@ -196,7 +194,7 @@ class Search {
     std::transform(all.begin() + 1, all.end(), std::back_inserter(view_rates_), rate_of);
   }
 
-  // How far a point moves in either image while that is exposed, in pixels.
+  // How far a point moves in either image while that is exposed, in pixels of a level.
   struct Streaks {
     Eigen::Vector2d in_view;
     Eigen::Vector2d in_target;
@@ -205,17 +203,19 @@ class Search {
   // nullopt where both are smeared alike, or nobody knows.
   std::optional<Streaks> StreaksOf(int view_index,
                                    int index,
+                                   int level,
                                    const Eigen::Matrix2d& target_from_view_px) const {
     if (!target_rate_ || !view_rates_[view_index]) return std::nullopt;
     const Eigen::Vector3d& bearing = views_[view_index].view->features.bearings[index];
-    const Streaks streaks{
-        SmearOf(camera_, bearing, *view_rates_[view_index], target_.exposure_s),
-        SmearOf(
-            camera_, target_from_view_[view_index] * bearing, *target_rate_, target_.exposure_s)};
-    const Eigen::Vector2d turned = target_from_view_px * streaks.in_view;
-    const double difference =
-        std::min((turned - streaks.in_target).norm(), (turned + streaks.in_target).norm());
-    if (!(difference > kStreakThatShowsPx)) return std::nullopt;
+    const auto streak = [&](const Eigen::Vector3d& shown, const Eigen::Vector3d& rate) {
+      return Eigen::Vector2d(target_.pyramid->scales[level].cwiseInverse().asDiagonal() *
+                             SmearOf(camera_, shown, rate, target_.exposure_s));
+    };
+    const Streaks streaks{streak(bearing, *view_rates_[view_index]),
+                          streak(target_from_view_[view_index] * bearing, *target_rate_)};
+    if (AreSmearedAlike(target_from_view_px, streaks.in_view, streaks.in_target)) {
+      return std::nullopt;
+    }
     return streaks;
   }
 
@@ -238,12 +238,11 @@ class Search {
         turns_patches_[view_index]
             ? PatchWarp(camera_, view.features.bearings[index], target_from_view_[view_index])
             : Eigen::Matrix2d(Eigen::Matrix2d::Identity());
-    if (const auto streaks = StreaksOf(view_index, index, warp)) {
-      const auto to_level = target_.pyramid->scales[level].cwiseInverse().asDiagonal();
-      return AlignBlurredPatch({image, center_px, warp, to_level * streaks->in_view},
+    if (const auto streaks = StreaksOf(view_index, index, level, warp)) {
+      return AlignBlurredPatch({image, center_px, warp, streaks->in_view},
                                target,
                                start_px,
-                               to_level * streaks->in_target,
+                               streaks->in_target,
                                reach_px);
     }
     const auto patch = PatchTemplate::Sample(image, center_px, warp);

@@ -1,6 +1,7 @@
 #include "rotodom/tracking/blur.h"
 
 #include <algorithm>
+#include <cmath>
 #include <string>
 
 #include <gtest/gtest.h>
@@ -115,6 +116,23 @@ TEST(AlignBlurredPatch, StaysInsideTheImage) {
     if (!found) continue;
     EXPECT_LE((found->center_px - corner_px).norm(), kPatchReachPx + 1.0);
   }
+}
+
+// Where a lens folds the image, streaks and warps have no bound.
+TEST(AlignBlurredPatch, RefusesWhatNoImageShows) {
+  const FilmedStart film = FilmStart(Start({0.0, 10.0, 0.0}), 1, 0.0);
+  const cv::Mat& image = film.views[0].pyramid.levels.front();
+  const Eigen::Vector2d middle_px(160.0, 120.0);
+  const Eigen::Matrix2d same = Eigen::Matrix2d::Identity();
+  const auto align = [&](const Eigen::Matrix2d& warp, const Eigen::Vector2d& streak_px) {
+    return AlignBlurredPatch(
+        {image, middle_px, warp, {3.0, 0.0}}, image, middle_px, streak_px, 3.0);
+  };
+  EXPECT_TRUE(align(same, {-3.0, 0.0}));
+  EXPECT_FALSE(align(same, {1e6, 0.0}));
+  EXPECT_FALSE(align(same, {std::nan(""), 0.0}));
+  EXPECT_FALSE(align(1e-4 * same, {1.0, 0.0}));
+  EXPECT_FALSE(align(Eigen::Matrix2d::Zero(), {1.0, 0.0}));
 }
 
 }  // namespace
