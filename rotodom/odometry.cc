@@ -117,7 +117,7 @@ FrameEstimate RotationalOdometry::AddFrame(FrameId frame,
                               estimate.cam_from_world,
                               NewestMotion(timestamp_s, estimate.cam_from_world),
                               nullptr,
-                              exposure_.Seconds(),
+                              ExposureToMatch(),
                               options_.features.max_features};
   const TrackingResult tracked = Track(recent, target, estimate);
   CarryOn(tracked, recent, *view);
@@ -444,6 +444,10 @@ std::optional<Eigen::Matrix3d> RotationalOdometry::CovarianceOf(FrameId frame) c
 
 std::optional<Eigen::Matrix3d> RotationalOdometry::CovarianceBetween(FrameId i, FrameId j) const {
   return UnlessUnknown(covariance_.Between(i, j));
+}
+
+double RotationalOdometry::ExposureToMatch() const {
+  return camera_.readout_s > 0.0 ? 0.0 : exposure_.Seconds();
 }
 
 void RotationalOdometry::MeasureExposure() {

@@ -157,6 +157,9 @@ class RotationalOdometry {
   void KeepGoodConnections(FrameEstimate& estimate) const;
   void AverageWindow(FrameEstimate& estimate);
   void UpdateCovariance(FrameEstimate& estimate);
+  // None with a rolling shutter: matching blur there drifts less on renderings (RPE_n 0.44 and 0.26
+  // deg), and more with the one real camera that was tried (TUM fr1_rpy, 2.8 and 3.9 deg).
+  double ExposureToMatch() const;
   // By the newest of the older views, whose rate is known from both sides, and one of those before.
   void MeasureExposure();
   // Drops what no later frame can refer to.

@@ -30,7 +30,8 @@ struct TrackingOptions {
   int min_points = 150;
   double min_found_ratio = 0.3;
   // Where the camera turns faster in one of two images than in the other, patches are sought with
-  // both smeared alike, by the time of exposure that the images tell.
+  // both smeared alike, by the time of exposure that the images tell; with a rolling shutter by
+  // completion alone.
   bool match_blur = true;
 
   std::optional<std::string> Problem() const;
