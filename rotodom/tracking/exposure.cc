@@ -1,6 +1,7 @@
 #include "rotodom/tracking/exposure.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <iterator>
 #include <vector>
@@ -25,7 +26,7 @@ constexpr double kMemory = 0.95;
 // Gain over exchanged streaks, in nats a patch, that is no chance: sharp images have 0.2 at most, 3
 // px of blur 0.5 to 1.
 constexpr double kLeastGain = 0.4;
-
+// A smear of 2 px within 20 ms.
 constexpr double kSlowestDifference_px_per_s = 100.0;
 
 // One point in two images, with the speed at which it moves in either.
@@ -59,7 +60,7 @@ std::vector<MovingPoint> CommonPoints(const Camera& camera,
   return points;
 }
 
-// Their mean, in front of what there was.
+// Adds the mean of the points to what is left of earlier pairs.
 template <class Unlikeness>
 void Remember(const std::vector<Unlikeness>& of_points, Unlikeness& remembered) {
   for (std::size_t candidate = 0; candidate < remembered.size(); ++candidate) {

@@ -34,7 +34,8 @@ class ExposureMeter {
   void Add(const Camera& camera, const TurningView& i, const TurningView& j, int num_threads);
 
   /// 0 where the images are sharp, and while nothing is known.
-  /// Error:  5 % and less on rendered turns exposed for 8 to 30 ms (exposure tests).
+  /// Error:  5 % and less on rendered turns exposed for 8 to 30 ms (exposure tests), up to 12 % on
+  ///         rendered walks.
   double Seconds() const;
 
   template <class Archive>
