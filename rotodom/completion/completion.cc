@@ -152,12 +152,9 @@ class Completion {
     const auto px = camera_.Project(place.in_cam);
     if (!px) return std::nullopt;
     place.mid_frame_px = place.image_px = *px;
-    if (camera_.readout_s == 0.0) {
-      place.streak_px = StreakOf(view, place);
-      return place;
-    }
-    // The pixel decides on the pose, which decides on the pixel.
-    for (int k = 0; k < 2; ++k) {
+    // With a rolling shutter the pixel decides on the pose, which decides on the pixel.
+    const int num_rounds = camera_.readout_s == 0.0 ? 0 : 2;
+    for (int k = 0; k < num_rounds; ++k) {
       const double late_s = camera_.ExposureTime(place.image_px);
       place.cam_from_world = view.view->motion.After(late_s) * view.cam_from_world;
       place.in_cam = place.cam_from_world *
@@ -166,12 +163,9 @@ class Completion {
       if (!late_px) return std::nullopt;
       place.image_px = *late_px;
     }
-    place.streak_px = StreakOf(view, place);
+    place.streak_px =
+        SmearOf(camera_, place.in_cam.normalized(), view.view->turn_while_exposed, 1.0);
     return place;
-  }
-
-  Eigen::Vector2d StreakOf(const PosedView& view, const Place& place) const {
-    return SmearOf(camera_, place.in_cam.normalized(), view.view->turn_while_exposed, 1.0);
   }
 
   // Where the other image shows the patch, both as much smeared as they are together.

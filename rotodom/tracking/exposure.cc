@@ -125,7 +125,6 @@ void ExposureMeter::Add(const Camera& camera,
 }
 
 double ExposureMeter::Seconds() const {
-  if (weight_ == 0.0) return 0.0;
   const auto best = std::min_element(unlikeness_.begin(), unlikeness_.end());
   const auto index = best - unlikeness_.begin();
   if (index == 0 || unlikeness_reversed_[index] - *best < kLeastGain * weight_) return 0.0;

@@ -30,7 +30,7 @@ class ExposureMeter {
 
   /// Adds what a pair of views shows; both need their images.
   /// @param num_threads  does not change the result.
-  /// Cost:  10 ms, one thread.
+  /// Cost:  5 ms, one thread.
   void Add(const Camera& camera, const TurningView& i, const TurningView& j, int num_threads);
 
   /// 0 where the images are sharp, and while nothing is known.
