@@ -12,7 +12,7 @@
 
 #include <yaml-cpp/yaml.h>
 
-#include "output/text_file.h"
+#include "rotodom/types/text_file.h"
 
 namespace rotslam {
 namespace {

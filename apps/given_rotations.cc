@@ -6,8 +6,8 @@
 #include <stdexcept>
 
 #include "output/metrics.h"
-#include "output/text_file.h"
 #include "rotodom/types/median.h"
+#include "rotodom/types/text_file.h"
 
 namespace rotslam {
 namespace {

@@ -2,7 +2,7 @@
 
 #include <stdexcept>
 
-#include "output/text_file.h"
+#include "rotodom/types/text_file.h"
 
 namespace rotslam {
 

@@ -14,9 +14,9 @@
 #include <vector>
 
 #include "output/binary_file.h"
-#include "output/text_file.h"
 #include "output/unit_length.h"
 #include "rotodom/camera/read_camera.h"
+#include "rotodom/types/text_file.h"
 
 namespace rotslam {
 namespace {

@@ -10,7 +10,7 @@
 #include "output/binary_file.h"
 #include "output/colmap_model.h"
 #include "output/map_keypoints.h"
-#include "output/text_file.h"
+#include "rotodom/types/text_file.h"
 
 namespace rotslam {
 namespace {

@@ -7,8 +7,8 @@
 #include "output/atomic_file.h"
 #include "output/binary_file.h"
 #include "output/ply.h"
-#include "output/text_file.h"
 #include "rotodom/types/median.h"
+#include "rotodom/types/text_file.h"
 
 namespace rotslam {
 namespace {

@@ -10,7 +10,7 @@
 #include <Eigen/Cholesky>
 
 #include "output/atomic_file.h"
-#include "output/text_file.h"
+#include "rotodom/types/text_file.h"
 
 namespace rotslam {
 namespace {

@@ -10,9 +10,9 @@
 
 #include "output/atomic_file.h"
 #include "output/colmap_model.h"
-#include "output/text_file.h"
 #include "output/unit_length.h"
 #include "rotodom/types/median.h"
+#include "rotodom/types/text_file.h"
 
 namespace rotslam {
 namespace {

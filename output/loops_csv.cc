@@ -8,7 +8,7 @@
 #include <string>
 
 #include "output/atomic_file.h"
-#include "output/text_file.h"
+#include "rotodom/types/text_file.h"
 
 namespace rotslam {
 

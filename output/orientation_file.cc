@@ -4,8 +4,8 @@
 #include <stdexcept>
 #include <string>
 
-#include "output/text_file.h"
 #include "output/unit_length.h"
+#include "rotodom/types/text_file.h"
 
 namespace rotslam {
 namespace {

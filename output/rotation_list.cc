@@ -13,8 +13,8 @@
 #include <Eigen/LU>
 
 #include "output/atomic_file.h"
-#include "output/text_file.h"
 #include "output/unit_length.h"
+#include "rotodom/types/text_file.h"
 
 namespace rotslam {
 namespace {

@@ -6,8 +6,8 @@
 #include <stdexcept>
 
 #include "output/atomic_file.h"
-#include "output/text_file.h"
 #include "output/unit_length.h"
+#include "rotodom/types/text_file.h"
 
 namespace rotslam {
 namespace {

@@ -3,7 +3,7 @@
 #include <cstddef>
 
 #include "output/atomic_file.h"
-#include "output/text_file.h"
+#include "rotodom/types/text_file.h"
 
 namespace rotslam {
 

@@ -7,7 +7,7 @@
 #include <vector>
 
 #include "output/atomic_file.h"
-#include "output/text_file.h"
+#include "rotodom/types/text_file.h"
 
 namespace rotslam {
 namespace {

@@ -8,7 +8,7 @@
 #include <yaml-cpp/yaml.h>
 
 #include "apps/config.h"
-#include "output/text_file.h"
+#include "rotodom/types/text_file.h"
 
 namespace rotslam {
 namespace {

@@ -4,7 +4,7 @@
 #include <cstdint>
 #include <optional>
 
-#include "output/text_file.h"
+#include "rotodom/types/text_file.h"
 
 namespace rotslam {
 namespace {

@@ -8,7 +8,7 @@
 
 #include <cairo.h>
 
-#include "output/text_file.h"
+#include "rotodom/types/text_file.h"
 
 namespace rotslam {
 namespace {

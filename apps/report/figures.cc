@@ -9,7 +9,7 @@
 #include <Eigen/Geometry>
 
 #include "apps/report/axes.h"
-#include "output/text_file.h"
+#include "rotodom/types/text_file.h"
 
 namespace rotslam {
 namespace {

@@ -237,8 +237,47 @@ const char* Name(CameraModel model) {
       return "radtan";
     case CameraModel::kEquidistant:
       return "equidistant";
+    case CameraModel::kRational:
+      return "rational";
+    case CameraModel::kFov:
+      return "fov";
   }
   return "unknown";
+}
+
+std::span<const CameraModel> AllCameraModels() {
+  static constexpr CameraModel kAll[] = {CameraModel::kPinhole,
+                                         CameraModel::kRadtan,
+                                         CameraModel::kEquidistant,
+                                         CameraModel::kRational,
+                                         CameraModel::kFov};
+  return kAll;
+}
+
+std::optional<CameraModel> FindCameraModel(const std::string& name) {
+  for (const CameraModel model : AllCameraModels()) {
+    if (name == Name(model)) return model;
+  }
+  return std::nullopt;
+}
+
+std::span<const char* const> DistortionNames(CameraModel model) {
+  static constexpr const char* kRational[] = {"k1", "k2", "p1", "p2", "k3", "k4", "k5", "k6"};
+  static constexpr const char* kEquidistant[] = {"k1", "k2", "k3", "k4"};
+  static constexpr const char* kFov[] = {"w"};
+  switch (model) {
+    case CameraModel::kPinhole:
+      return {};
+    case CameraModel::kRadtan:
+      return std::span(kRational).first<5>();
+    case CameraModel::kEquidistant:
+      return kEquidistant;
+    case CameraModel::kRational:
+      return kRational;
+    case CameraModel::kFov:
+      return kFov;
+  }
+  return {};
 }
 
 const char* Name(ReadoutStart start) {
@@ -326,11 +365,11 @@ std::optional<std::string> Camera::Problem() const {
     return "size is " + std::to_string(width) + "x" + std::to_string(height) +
            ", must be positive, or 0x0 for not known";
   }
-  if (model == CameraModel::kPinhole && distortion != std::array<double, 5>{}) {
-    return "model pinhole has no distortion, but its coefficients are not all zero";
-  }
-  if (model == CameraModel::kEquidistant && distortion[4] != 0.0) {
-    return "model equidistant has four distortion coefficients, but the fifth is not zero";
+  for (std::size_t k = DistortionNames(model).size(); k < distortion.size(); ++k) {
+    if (distortion[k] == 0.0) continue;
+    return "model " + std::string(Name(model)) + " has " +
+           std::to_string(DistortionNames(model).size()) + " distortion coefficients, but number " +
+           std::to_string(k + 1) + " is not zero";
   }
   return std::nullopt;
 }
@@ -340,15 +379,11 @@ std::string Describe(const Camera& camera) {
   text.precision(10);
   text << Name(camera.model) << ", fx " << camera.fx << ", fy " << camera.fy << ", cx " << camera.cx
        << ", cy " << camera.cy;
-  const auto& k = camera.distortion;
-  if (camera.model == CameraModel::kRadtan) {
-    text << ", k1 " << k[0] << ", k2 " << k[1] << ", p1 " << k[2] << ", p2 " << k[3] << ", k3 "
-         << k[4];
-  } else if (camera.model == CameraModel::kEquidistant) {
-    text << ", k1 " << k[0] << ", k2 " << k[1] << ", k3 " << k[2] << ", k4 " << k[3];
-  } else {
-    text << ", no distortion";
+  const auto names = DistortionNames(camera.model);
+  for (std::size_t k = 0; k < names.size(); ++k) {
+    text << ", " << names[k] << " " << camera.distortion[k];
   }
+  if (names.empty()) text << ", no distortion";
   if (camera.width > 0) {
     text << ", " << camera.width << "x" << camera.height;
   } else {

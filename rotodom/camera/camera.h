@@ -1,7 +1,9 @@
 #pragma once
 
 #include <array>
+#include <cstddef>
 #include <optional>
+#include <span>
 #include <string>
 
 #include <Eigen/Core>
@@ -12,10 +14,22 @@ enum class CameraModel {
   kPinhole,      // no distortion
   kRadtan,       // OpenCV: k1 k2 p1 p2 k3
   kEquidistant,  // Kannala-Brandt as in OpenCV's fisheye module: k1 k2 k3 k4
+  kRational,     // OpenCV's CALIB_RATIONAL_MODEL: k1 k2 p1 p2 k3 and k4 k5 k6 of the denominator
+  kFov,          // Devernay & Faugeras, MVA 2001: w, the field of view of the lens in radians
 };
 
-/// `pinhole`, `radtan` or `equidistant`, as our camera files spell it.
+/// All models, in the order of CameraModel.
+std::span<const CameraModel> AllCameraModels();
+
+/// `pinhole`, `radtan`, `equidistant`, `rational` or `fov`, as our camera files spell it.
 const char* Name(CameraModel model);
+
+/// The model of this name; nullopt: none.
+std::optional<CameraModel> FindCameraModel(const std::string& name);
+
+/// Names of a model's distortion coefficients, in the order of Camera::distortion; empty for
+/// kPinhole.
+std::span<const char* const> DistortionNames(CameraModel model);
 
 /// The side of the image that a rolling shutter exposes first: the top, or another one where images
 /// are turned after they were taken, as those of a phone held upright.
@@ -36,7 +50,7 @@ struct Camera {
   double fy = 0.0;
   double cx = 0.0;
   double cy = 0.0;
-  std::array<double, 5> distortion = {};  // k1 k2 p1 p2 k3, or k1 k2 k3 k4 and a zero
+  std::array<double, 8> distortion = {};  // as DistortionNames(model) says; zeros behind them
   // Rolling shutter: time from the exposure of the first row to that of the last (of the columns if
   // it starts at a side); 0 for a global shutter.
   double readout_s = 0.0;

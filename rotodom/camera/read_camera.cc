@@ -109,21 +109,21 @@ class Section {
   std::string prefix_;
 };
 
-std::array<double, 5> ReadDistortion(const Section& section,
+std::array<double, 8> ReadDistortion(const Section& section,
                                      const std::string& key,
                                      CameraModel model) {
   const std::vector<std::string> texts = section.List(key);
   const bool right_count = model == CameraModel::kPinhole  ? texts.empty()
                            : model == CameraModel::kRadtan ? texts.size() == 4 || texts.size() == 5
                                                            : texts.size() == 4;
-  std::array<double, 5> distortion = {};
+  std::array<double, 8> distortion = {};
   for (std::size_t k = 0; k < texts.size(); ++k) {
     const std::string name = section.FullKey(key) + "[" + std::to_string(k) + "]";
     const double value = FiniteNumber(section.file(), name, texts[k]);
     if (k < distortion.size()) distortion[k] = value;
   }
   // Zeros say nothing: pinhole files often carry four of them.
-  const bool silent = model == CameraModel::kPinhole && distortion == std::array<double, 5>{};
+  const bool silent = model == CameraModel::kPinhole && distortion == std::array<double, 8>{};
   if (!right_count && !(silent && texts.size() <= distortion.size())) {
     Fail(section.file(),
          section.FullKey(key) + " has " + std::to_string(texts.size()) + " values, " + Name(model) +
@@ -136,7 +136,7 @@ std::array<double, 5> ReadDistortion(const Section& section,
 }
 
 CameraModel WithoutEmptyDistortion(const Camera& camera) {
-  const bool empty = camera.distortion == std::array<double, 5>{};
+  const bool empty = camera.distortion == std::array<double, 8>{};
   return camera.model == CameraModel::kRadtan && empty ? CameraModel::kPinhole : camera.model;
 }
 
@@ -481,9 +481,7 @@ std::string CameraYaml(const Camera& camera) {
   text += "fy: " + NumberText(camera.fy) + "\n";
   text += "cx: " + NumberText(camera.cx) + "\n";
   text += "cy: " + NumberText(camera.cy) + "\n";
-  const std::size_t count = camera.model == CameraModel::kPinhole  ? 0
-                            : camera.model == CameraModel::kRadtan ? 5
-                                                                   : 4;
+  const std::size_t count = DistortionNames(camera.model).size();
   text += "distortion: [";
   for (std::size_t k = 0; k < count; ++k) {
     if (k > 0) text += ", ";

@@ -10,8 +10,8 @@
 #include "output/map_keypoints.h"
 #include "output/nerf.h"
 #include "output/openmvg.h"
-#include "output/text_file.h"
 #include "output/trajectory.h"
+#include "rotodom/types/text_file.h"
 #include "tests/output/scene_map.h"
 #include "tests/output/temporary_folder.h"
 

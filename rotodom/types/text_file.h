@@ -10,6 +10,11 @@ namespace rotslam {
 /// The content of a file. Throws std::runtime_error naming `path` when it cannot be read.
 std::string ReadBytes(const std::filesystem::path& path);
 
+/// The content of a text file, without a byte-order mark and with '\n' at the end of every line,
+/// whatever system wrote it. Throws std::runtime_error naming `path` when it cannot be read or is
+/// no text: UTF-16, or a file with bytes of value zero.
+std::string ReadText(const std::filesystem::path& path);
+
 /// One line of a text file that carries data, cut at blanks and commas.
 struct TextRow {
   int line = 0;  // 1 is the file's first line

@@ -1,4 +1,4 @@
-#include "output/text_file.h"
+#include "rotodom/types/text_file.h"
 
 #include <algorithm>
 #include <array>
@@ -8,6 +8,7 @@
 #include <cstdio>
 #include <fstream>
 #include <limits>
+#include <sstream>
 #include <stdexcept>
 #include <string_view>
 #include <system_error>
@@ -64,8 +65,28 @@ std::string ReadBytes(const std::filesystem::path& path) {
   return bytes;
 }
 
+std::string ReadText(const std::filesystem::path& path) {
+  const std::string bytes = ReadBytes(path);
+  if (bytes.starts_with("\xff\xfe") || bytes.starts_with("\xfe\xff")) {
+    throw std::runtime_error(path.string() + ": is UTF-16; save it as UTF-8");
+  }
+  if (bytes.find('\0') != std::string::npos) {
+    throw std::runtime_error(path.string() + ": is not a text file");
+  }
+  std::string text;
+  text.reserve(bytes.size());
+  for (std::size_t k = bytes.starts_with("\xef\xbb\xbf") ? 3 : 0; k < bytes.size(); ++k) {
+    if (bytes[k] != '\r') {
+      text += bytes[k];
+    } else if (k + 1 == bytes.size() || bytes[k + 1] != '\n') {
+      text += '\n';
+    }
+  }
+  return text;
+}
+
 std::vector<TextRow> ReadTextRows(const std::filesystem::path& path) {
-  std::ifstream file = Open(path);
+  std::istringstream file(ReadText(path));
   std::vector<TextRow> rows;
   std::string line;
   for (int number = 1; std::getline(file, line); ++number) {
@@ -73,12 +94,11 @@ std::vector<TextRow> ReadTextRows(const std::filesystem::path& path) {
     if (words.empty() || words.front().front() == '#') continue;
     rows.push_back({number, std::move(words)});
   }
-  if (file.bad()) throw std::runtime_error(path.string() + ": reading stopped half way");
   return rows;
 }
 
 std::vector<TextRow> ReadCsvRows(const std::filesystem::path& path, std::size_t num_columns) {
-  std::ifstream file = Open(path);
+  std::istringstream file(ReadText(path));
   std::vector<TextRow> rows;
   std::string line;
   std::getline(file, line);  // the columns' names
