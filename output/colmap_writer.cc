@@ -157,6 +157,10 @@ ColmapCamera ToColmap(const Camera& camera) {
       return with(6, "FULL_OPENCV", {d[0], d[1], d[2], d[3], d[4], 0.0, 0.0, 0.0});
     case CameraModel::kEquidistant:
       return with(5, "OPENCV_FISHEYE", {d[0], d[1], d[2], d[3]});
+    case CameraModel::kRational:
+      return with(6, "FULL_OPENCV", {d[0], d[1], d[2], d[3], d[4], d[5], d[6], d[7]});
+    case CameraModel::kFov:
+      return with(7, "FOV", {d[0]});
   }
   throw std::invalid_argument("ToColmap: the camera's model is not known");
 }

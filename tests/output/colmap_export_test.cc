@@ -30,7 +30,7 @@ INSTANTIATE_TEST_SUITE_P(Colmap,
 TEST_P(ColmapForms, ReadBackTheSame) {
   const TemporaryFolder folder;
   RunMap map = MapOfScene(ExportScene());
-  for (const auto& [model, distortion] : std::vector<std::pair<CameraModel, std::array<double, 5>>>{
+  for (const auto& [model, distortion] : std::vector<std::pair<CameraModel, std::array<double, 8>>>{
            {CameraModel::kPinhole, {}},
            {CameraModel::kRadtan, {-0.1, 0.02, 1e-3, -2e-3, 0.0}},
            {CameraModel::kRadtan, {-0.1, 0.02, 1e-3, -2e-3, 0.003}},

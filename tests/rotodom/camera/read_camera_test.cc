@@ -47,7 +47,7 @@ class ReadCameraTest : public testing::Test {
 Camera Make(CameraModel model,
             const std::array<int, 2>& size,
             const std::array<double, 4>& intrinsics,
-            const std::array<double, 5>& distortion = {}) {
+            const std::array<double, 8>& distortion = {}) {
   Camera camera;
   camera.model = model;
   camera.width = size[0];
