@@ -56,7 +56,7 @@ std::unique_ptr<Sequence> OpenImages(const CalibrateFlags& flags) {
   SequenceOptions options;
   options.stride = std::max(1, flags.stride);
   auto sequence = OpenSequence(flags.images, options);
-  if (flags.stride == 0 && sequence->kind() == SequenceKind::kVideo) {
+  if (flags.stride == 0 && sequence->is_video()) {
     options.stride = std::max(1, sequence->NumFrames() / kFramesOfVideo);
     if (options.stride > 1) sequence = OpenSequence(flags.images, options);
   }

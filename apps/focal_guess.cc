@@ -95,7 +95,7 @@ FocalGuess GuessFocal(const std::filesystem::path& sequence,
                       const SequenceOptions& options,
                       const cv::Size& image_size) {
   FocalGuess guess;
-  const Layout layout = FindLayout(sequence, options.fps);
+  const Layout layout = FindLayout(sequence, options);
   const auto film_mm =
       layout.entries.empty() ? std::nullopt : FilmFocalLength(layout.entries.front().file);
   if (film_mm) {

@@ -59,12 +59,18 @@ std::shared_ptr<const Vocabulary> OpenVocabulary(const InputFlags& flags) {
 
 namespace {
 
-// From --camera, else from what lies with the images.
+// From --camera, else from what lies with the images, else as the form of the input says.
 void ReadCalibration(const InputFlags& flags, Input& input) {
+  Camera camera;
   if (!flags.camera.empty()) {
     input.camera_file = flags.camera;
-  } else if (const auto& file = input.sequence->CameraFile()) {
-    input.camera_file = file->string();
+    camera = ReadCamera(input.camera_file);
+  } else if (const auto& reference = input.sequence->camera_reference()) {
+    input.camera_file = reference->file.string();
+    camera = ReadCamera(*reference, input.sequence->image_folder());
+  } else if (const auto& own_camera = input.sequence->own_camera()) {
+    input.camera_file = input.sequence->form();
+    camera = *own_camera;
   } else {
     throw std::runtime_error(
         flags.sequence +
@@ -72,7 +78,6 @@ void ReadCalibration(const InputFlags& flags, Input& input) {
         "checkerboard and let `rotslam calibrate` make it), or have one guessed with "
         "--focal-guess");
   }
-  const Camera camera = ReadCamera(input.camera_file);
   try {
     input.camera = MatchToImages(camera, input.sequence->image_size());
   } catch (const std::runtime_error& error) {

@@ -287,7 +287,7 @@ void WriteMaps(const std::filesystem::path& directory,
   map.num_levels = features.num_levels;
   map.camera = positions.camera;
   map.image_folder = std::filesystem::absolute(sequence.image_folder()).lexically_normal().string();
-  map.is_video = sequence.kind() == SequenceKind::kVideo;
+  map.is_video = sequence.is_video();
   for (const auto& [frame, cam_from_world] : positions.cam_from_world) {
     map.frames.push_back({frame,
                           orientations.timestamps_s[frame.value],

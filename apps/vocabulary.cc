@@ -65,7 +65,7 @@ std::vector<std::filesystem::path> ListImages(const VocabularyFlags& flags) {
       images.emplace_back(name);
       continue;
     }
-    const Layout layout = FindLayout(name, 1.0);
+    const Layout layout = FindLayout(name, {});
     for (std::size_t k = 0; k < layout.entries.size();
          k += static_cast<std::size_t>(flags.stride)) {
       images.push_back(layout.entries[k].file);

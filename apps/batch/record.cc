@@ -63,7 +63,7 @@ void AddMetrics(const BatchEntry& entry,
   try {
     const std::optional<fs::path> truth =
         entry.ground_truth.empty()
-            ? FindLayout(entry.path, entry.options.sequence.fps).ground_truth_file
+            ? FindLayout(entry.path, entry.options.sequence).ground_truth_file
             : std::optional<fs::path>(entry.ground_truth);
     if (!truth) return;
     const std::optional<fs::path> times =

@@ -57,9 +57,10 @@ class PySequence {
   int NumFrames() const { return sequence_->NumFrames(); }
 
   std::optional<Camera> OwnCamera() const {
-    const auto& file = sequence_->CameraFile();
-    if (!file) return std::nullopt;
-    return MatchToImages(ReadCamera(*file), sequence_->image_size());
+    const auto& reference = sequence_->camera_reference();
+    if (!reference) return sequence_->own_camera();
+    return MatchToImages(ReadCamera(*reference, sequence_->image_folder()),
+                         sequence_->image_size());
   }
 
   std::optional<std::string> GroundTruth() const {

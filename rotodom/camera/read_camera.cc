@@ -415,6 +415,10 @@ std::string NumberText(double value) {
 
 }  // namespace
 
+Camera ReadCamera(const CameraReference& reference, const std::filesystem::path&) {
+  return ReadCamera(reference.file);
+}
+
 Camera ReadColmapCamera(const fs::path& file, const std::vector<std::string>& words) {
   const std::string who = "camera " + words[0] + ": ";
   const auto& models = ColmapModels();

@@ -42,6 +42,16 @@ namespace rotslam {
 /// known, a number missing, malformed, not finite, or not positive where it has to be.
 Camera ReadCamera(const std::filesystem::path& path);
 
+/// A file and, after a colon, the camera in it: "calib.yaml:cam1". (A path that exists as it stands
+/// is a file without a name.)
+struct CameraReference {
+  std::filesystem::path file;
+  std::string name;
+};
+
+/// The camera of the file that is named, or that belongs to the images in `image_folder`.
+Camera ReadCamera(const CameraReference& reference, const std::filesystem::path& image_folder = {});
+
 /// One camera of a COLMAP model from the words of its line in `cameras.txt`: id, model, width,
 /// height, parameters. Throws as ReadCamera does.
 Camera ReadColmapCamera(const std::filesystem::path& file, const std::vector<std::string>& words);

@@ -5,6 +5,7 @@
 #include <string>
 #include <vector>
 
+#include "rotodom/camera/read_camera.h"
 #include "rotodom/sequence/sequence.h"
 
 namespace rotslam {
@@ -15,19 +16,23 @@ struct ImageEntry {
   double timestamp_s = 0.0;
 };
 
-/// What FindLayout understood of a path.
+/// What a form of input (SequenceForm) found at a path.
 struct Layout {
-  SequenceKind kind = SequenceKind::kImageFolder;
+  std::string form;                 // name of the form
+  bool is_video = false;            // a file whose frames are numbered, without names of their own
   std::filesystem::path folder;     // where the images are; the file itself for a video
-  std::vector<ImageEntry> entries;  // in order; empty for a video
-  std::optional<std::filesystem::path> camera_file;
-  std::optional<std::filesystem::path> ground_truth_file;
+  std::vector<ImageEntry> entries;  // in order; empty where the form opens the frames itself
+  std::string times_source;         // a short phrase: "times.txt", "file names (ns since 1970)"
+  bool times_are_made_up = false;   // the frames are numbered and SequenceOptions::fps is believed
+  std::optional<CameraReference> camera;                   // calibration that lies with the images
+  std::optional<Camera> own_camera;                        // calibration that the form itself says
+  std::optional<std::filesystem::path> ground_truth_file;  // a file, or a folder of pose files
+  std::vector<std::string> notes;  // assumed, left out or ignored; one line each
 };
 
 /// Recognises a path as described at OpenSequence and lists its images; decodes none.
-/// @param fps  times of an image folder whose names tell none.
 /// Throws std::runtime_error, with path and reason in one line.
-Layout FindLayout(const std::filesystem::path& path, double fps);
+Layout FindLayout(const std::filesystem::path& path, const SequenceOptions& options);
 
 /// Order of names in which runs of digits count as numbers: frame2 < frame10.
 bool NaturalLess(const std::string& a, const std::string& b);

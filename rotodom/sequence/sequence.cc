@@ -15,6 +15,8 @@
 
 #include "rotodom/sequence/image_file.h"
 #include "rotodom/sequence/layout.h"
+#include "rotodom/sequence/sequence_form.h"
+#include "rotodom/sequence/video.h"
 
 namespace rotslam {
 namespace {
@@ -43,11 +45,8 @@ void CheckIncreasing(const std::vector<ImageEntry>& entries) {
 
 class FileSequence : public Sequence {
  public:
-  FileSequence(Layout layout, const SequenceOptions& options) {
-    kind_ = layout.kind;
+  FileSequence(Layout layout, const SequenceOptions& options) : Sequence(layout) {
     place_ = std::move(layout.folder);
-    camera_file_ = std::move(layout.camera_file);
-    ground_truth_file_ = std::move(layout.ground_truth_file);
     const int num_entries = static_cast<int>(layout.entries.size());
     if (options.first >= num_entries) FailBeyondEnd(place_, options.first, num_entries);
     const bool to_the_end = options.last < 0 || options.last >= num_entries;
@@ -120,10 +119,9 @@ int VideoBackEnd() {
 
 class VideoSequence : public Sequence {
  public:
-  VideoSequence(Layout layout, const SequenceOptions& options) : options_(options) {
-    kind_ = SequenceKind::kVideo;
+  VideoSequence(Layout layout, const SequenceOptions& options)
+      : Sequence(layout), options_(options) {
     place_ = image_folder_ = std::move(layout.folder);
-    camera_file_ = std::move(layout.camera_file);
     Probe();
     capture_.open(place_.string(), VideoBackEnd());
     while (number_ <= options.first) {
@@ -218,22 +216,6 @@ class VideoSequence : public Sequence {
   double time_s_ = 0.0;  // of the frame grabbed last
 };
 
-const char* KindText(SequenceKind kind) {
-  switch (kind) {
-    case SequenceKind::kImageFolder:
-      return "image folder";
-    case SequenceKind::kKittiOdometry:
-      return "KITTI odometry";
-    case SequenceKind::kTumRgbd:
-      return "TUM RGB-D";
-    case SequenceKind::kEuroc:
-      return "EuRoC";
-    case SequenceKind::kVideo:
-      return "video";
-  }
-  return "unknown";
-}
-
 }  // namespace
 
 std::optional<std::string> SequenceOptions::Problem() const {
@@ -250,6 +232,16 @@ std::optional<std::string> SequenceOptions::Problem() const {
   return std::nullopt;
 }
 
+Sequence::Sequence(const Layout& layout)
+    : form_(layout.form),
+      is_video_(layout.is_video),
+      times_source_(layout.times_source),
+      times_are_made_up_(layout.times_are_made_up),
+      notes_(layout.notes),
+      camera_reference_(layout.camera),
+      own_camera_(layout.own_camera),
+      ground_truth_file_(layout.ground_truth_file) {}
+
 std::optional<Frame> Sequence::Next() {
   std::optional<Frame> frame = Decode();
   if (frame && !frame->image.empty() && frame->image.size() != image_size_) {
@@ -262,10 +254,10 @@ std::optional<Frame> Sequence::Next() {
 
 std::string Sequence::Describe() const {
   std::ostringstream text;
-  text << KindText(kind_) << ", ";
+  text << form_ << ", ";
   if (num_frames_ >= 0) text << num_frames_ << " frames, ";
   text << SizeText(image_size_) << ", ";
-  if (kind_ != SequenceKind::kVideo) {
+  if (timestamps_s_.size() > 1) {
     text << std::fixed << std::setprecision(1) << timestamps_s_.back() - timestamps_s_.front()
          << " s, ";
   }
@@ -273,14 +265,17 @@ std::string Sequence::Describe() const {
   return text.str();
 }
 
+std::unique_ptr<Sequence> OpenVideo(Layout layout, const SequenceOptions& options) {
+  return std::make_unique<VideoSequence>(std::move(layout), options);
+}
+
 std::unique_ptr<Sequence> OpenSequence(const fs::path& path, const SequenceOptions& options) {
   if (const auto problem = options.Problem()) {
     throw std::invalid_argument("sequence options: " + *problem);
   }
-  Layout layout = FindLayout(path, options.fps);
-  if (layout.kind == SequenceKind::kVideo) {
-    return std::make_unique<VideoSequence>(std::move(layout), options);
-  }
+  const SequenceForm& form = FindSequenceForm(path);
+  Layout layout = FindLayout(path, options);
+  if (form.open != nullptr) return form.open(std::move(layout), options);
   return std::make_unique<FileSequence>(std::move(layout), options);
 }
 

@@ -10,6 +10,7 @@
 #include <opencv2/core/mat.hpp>
 
 #include "rotodom/camera/camera.h"
+#include "rotodom/camera/read_camera.h"
 #include "rotodom/types/ids.h"
 
 namespace rotslam {
@@ -37,13 +38,7 @@ struct SequenceOptions {
   }
 };
 
-enum class SequenceKind {
-  kImageFolder,
-  kKittiOdometry,
-  kTumRgbd,
-  kEuroc,
-  kVideo,
-};
+struct Layout;
 
 /// One input frame.
 struct Frame {
@@ -83,7 +78,20 @@ class Sequence {
   /// Size of the first readable image; every other image must have it.
   cv::Size image_size() const { return image_size_; }
 
-  SequenceKind kind() const { return kind_; }
+  /// Is it a file whose frames are numbered, without names of their own?
+  bool is_video() const { return is_video_; }
+
+  /// Name of the form that the input was taken for: "EuRoC ASL", "image folder", "video".
+  const std::string& form() const { return form_; }
+
+  /// Where the times come from, a short phrase: "times.txt", "file names (ns since 1970)".
+  const std::string& times_source() const { return times_source_; }
+
+  /// True when frames are numbered and SequenceOptions::fps is believed.
+  bool times_are_made_up() const { return times_are_made_up_; }
+
+  /// What was assumed, left out or ignored; one line each.
+  const std::vector<std::string>& notes() const { return notes_; }
 
   /// Folder that Frame::name is in; for a video, the file.
   const std::filesystem::path& image_folder() const { return image_folder_; }
@@ -93,25 +101,35 @@ class Sequence {
 
   /// Calibration that lies with the images: `camera.yaml` of our own in any layout, else the data
   /// set's file (KITTI `calib.txt`, EuRoC `sensor.yaml`). For ReadCamera.
-  const std::optional<std::filesystem::path>& CameraFile() const { return camera_file_; }
+  const std::optional<CameraReference>& camera_reference() const { return camera_reference_; }
+
+  /// Calibration that the input itself says, as a bag or a known data set does; a file that lies
+  /// with the images goes first.
+  const std::optional<Camera>& own_camera() const { return own_camera_; }
 
   /// Camera trajectory that lies with the images, in TUM or KITTI form: `groundtruth_tum.txt`,
   /// `groundtruth_cam0_tum.txt`, `groundtruth.txt`, `poses.txt`.
   const std::optional<std::filesystem::path>& GroundTruthFile() const { return ground_truth_file_; }
 
  protected:
-  Sequence() = default;
+  /// Takes over what `layout` says of the input, but neither its place nor its entries.
+  explicit Sequence(const Layout& layout);
 
   // The next frame as decoded, its size unchecked; nullopt after the last.
   virtual std::optional<Frame> Decode() = 0;
 
-  SequenceKind kind_ = SequenceKind::kImageFolder;
+  std::string form_;
+  bool is_video_ = false;
+  std::string times_source_;
+  bool times_are_made_up_ = false;
+  std::vector<std::string> notes_;
   std::filesystem::path place_;
   std::filesystem::path image_folder_;
   int num_frames_ = -1;
   std::vector<double> timestamps_s_;
   cv::Size image_size_;
-  std::optional<std::filesystem::path> camera_file_;
+  std::optional<CameraReference> camera_reference_;
+  std::optional<Camera> own_camera_;
   std::optional<std::filesystem::path> ground_truth_file_;
 };
 

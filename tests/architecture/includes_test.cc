@@ -18,6 +18,7 @@ const std::map<Folder, std::set<Folder>> kAllowed = {
     {"rotodom/types", {}},
     {"rotodom/camera", {"rotodom/types"}},
     {"rotodom/sequence", {"rotodom/types", "rotodom/camera"}},
+    {"rotodom/sequence/forms", {"rotodom/types", "rotodom/camera", "rotodom/sequence"}},
     {"rotodom/features", {"rotodom/types", "rotodom/camera"}},
     {"rotodom/matching", {"rotodom/types", "rotodom/camera", "rotodom/features"}},
     {"rotodom/relative_rotation", {"rotodom/types"}},

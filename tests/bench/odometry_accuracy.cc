@@ -48,12 +48,12 @@ TestSequence Simulated(SimulationKind kind, std::uint64_t seed) {
 
 TestSequence FromFolder(const std::string& path) {
   const std::shared_ptr<Sequence> sequence = OpenSequence(path, {});
-  if (!sequence->CameraFile() || !sequence->GroundTruthFile()) {
+  if (!sequence->camera_reference() || !sequence->GroundTruthFile()) {
     throw std::runtime_error(path + ": no calibration or no ground truth lies with the images");
   }
   TestSequence test;
   test.name = path.substr(path.find_last_of('/') + 1);
-  test.camera = MatchToImages(ReadCamera(*sequence->CameraFile()), sequence->image_size());
+  test.camera = MatchToImages(ReadCamera(*sequence->camera_reference()), sequence->image_size());
   test.truth = ReadTrajectory(*sequence->GroundTruthFile());
   if (static_cast<int>(test.truth.size()) != sequence->NumFrames()) {
     throw std::runtime_error(path + ": the ground truth has not one pose a frame");

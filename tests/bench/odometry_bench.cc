@@ -69,9 +69,9 @@ Clip Rendered(SimulationKind kind) {
 
 Clip Read(const std::string& path) {
   const auto sequence = OpenSequence(path, {});
-  if (!sequence->CameraFile()) throw std::runtime_error(path + ": has no calibration");
+  if (!sequence->camera_reference()) throw std::runtime_error(path + ": has no calibration");
   Clip clip;
-  clip.camera = MatchToImages(ReadCamera(*sequence->CameraFile()), sequence->image_size());
+  clip.camera = MatchToImages(ReadCamera(*sequence->camera_reference()), sequence->image_size());
   const double start = WallSeconds();
   while (auto frame = sequence->Next()) clip.images.push_back(std::move(frame->image));
   clip.decode_ms = 1e3 * (WallSeconds() - start) / static_cast<double>(clip.images.size());

@@ -60,6 +60,12 @@ TEST(TimestampsFromNames, LeavesIndicesAlone) {
   EXPECT_FALSE(TimestampsFromNames({"1403715273262142976", "1403715273262142"}));
 }
 
+SequenceOptions At10Fps() {
+  SequenceOptions options;
+  options.fps = 10.0;
+  return options;
+}
+
 class LayoutTest : public ScratchFolderTest {
  protected:
   std::vector<std::string> Names(const Layout& layout) const {
@@ -76,7 +82,7 @@ class LayoutTest : public ScratchFolderTest {
   }
   std::string Complaint(const std::filesystem::path& path) const {
     try {
-      FindLayout(path, 10.0);
+      FindLayout(path, At10Fps());
       return "no complaint";
     } catch (const std::runtime_error& error) {
       EXPECT_THAT(error.what(), testing::Not(HasSubstr("\n")));
@@ -88,11 +94,11 @@ class LayoutTest : public ScratchFolderTest {
 TEST_F(LayoutTest, ImageFolder) {
   for (const char* name : {"f10.png", "f9.JPG", "._f9.JPG", "notes.txt"}) WriteText(name, "x");
   std::filesystem::create_directories(folder_ / "f0.png");  // a folder, whatever its name says
-  const Layout layout = FindLayout(folder_, 10.0);
-  EXPECT_EQ(layout.kind, SequenceKind::kImageFolder);
+  const Layout layout = FindLayout(folder_, At10Fps());
+  EXPECT_EQ(layout.form, "image folder");
   EXPECT_THAT(Names(layout), ElementsAre("f9.JPG", "f10.png"));
   EXPECT_THAT(Times(layout), ElementsAre(0.0, 0.1));
-  EXPECT_FALSE(layout.camera_file);
+  EXPECT_FALSE(layout.camera);
   EXPECT_FALSE(layout.ground_truth_file);
 }
 
@@ -102,10 +108,10 @@ TEST_F(LayoutTest, ImageFolderWithTimesInItsNames) {
   WriteText("camera.yaml", "x");
   WriteText("groundtruth_tum.txt", "x");
   for (const auto& path : {folder_, folder_ / "images", folder_ / "images" / ""}) {
-    const Layout layout = FindLayout(path, 10.0);
+    const Layout layout = FindLayout(path, At10Fps());
     EXPECT_THAT(Names(layout), ElementsAre("images/1000.25.png", "images/1000.5.png"));
     EXPECT_THAT(Times(layout), ElementsAre(1000.25, 1000.5));
-    EXPECT_EQ(layout.camera_file, folder_ / "camera.yaml");
+    EXPECT_EQ(layout.camera.value().file, folder_ / "camera.yaml");
     EXPECT_EQ(layout.ground_truth_file, folder_ / "groundtruth_tum.txt");
   }
 }
@@ -114,7 +120,7 @@ TEST_F(LayoutTest, ImageFolderLeavesDepthMapsOut) {
   for (const char* name : {"frame-000000.color.png", "frame-000000.depth.png"}) {
     WriteText(name, "x");
   }
-  EXPECT_THAT(Names(FindLayout(folder_, 10.0)), ElementsAre("frame-000000.color.png"));
+  EXPECT_THAT(Names(FindLayout(folder_, At10Fps())), ElementsAre("frame-000000.color.png"));
 }
 
 TEST_F(LayoutTest, Kitti) {
@@ -125,17 +131,17 @@ TEST_F(LayoutTest, Kitti) {
   WriteText("times.txt", "0.000000e+00\r\n1.037359e-01\n2.073381e-01\n");
   WriteText("calib.txt", "x");
   WriteText("poses.txt", "x");
-  const Layout layout = FindLayout(folder_, 10.0);
-  EXPECT_EQ(layout.kind, SequenceKind::kKittiOdometry);
+  const Layout layout = FindLayout(folder_, At10Fps());
+  EXPECT_EQ(layout.form, "KITTI odometry");
   EXPECT_THAT(Names(layout), ElementsAre("image_0/000000.png", "image_0/000002.png"));
   EXPECT_THAT(Times(layout), ElementsAre(0.0, 0.2073381));
-  EXPECT_EQ(layout.camera_file, folder_ / "calib.txt");
+  EXPECT_EQ(layout.camera.value().file, folder_ / "calib.txt");
   EXPECT_EQ(layout.ground_truth_file, folder_ / "poses.txt");
-  EXPECT_THAT(Names(FindLayout(folder_ / "image_2", 10.0)), ElementsAre("image_2/000000.png"));
+  EXPECT_THAT(Names(FindLayout(folder_ / "image_2", At10Fps())), ElementsAre("image_2/000000.png"));
   WriteText("times.txt", "0.0\n0.1\n");
   EXPECT_THAT(Complaint(folder_), HasSubstr("has 2 times, none for"));
   WriteText("times.txt", "0.0\nsoon\n");
-  EXPECT_THAT(Complaint(folder_), HasSubstr("line 2 is 'soon'"));
+  EXPECT_THAT(Complaint(folder_), HasSubstr("times.txt:2: is 'soon'"));
 }
 
 TEST_F(LayoutTest, TumRgbd) {
@@ -143,13 +149,13 @@ TEST_F(LayoutTest, TumRgbd) {
             "# color images\n# timestamp filename\n1305.5 rgb/1305.5.png\n"
             "1306.25 rgb/1306.25.png\r\n");
   WriteText("groundtruth.txt", "x");
-  const Layout layout = FindLayout(folder_, 10.0);
-  EXPECT_EQ(layout.kind, SequenceKind::kTumRgbd);
+  const Layout layout = FindLayout(folder_, At10Fps());
+  EXPECT_EQ(layout.form, "TUM RGB-D");
   EXPECT_THAT(Names(layout), ElementsAre("rgb/1305.5.png", "rgb/1306.25.png"));
   EXPECT_THAT(Times(layout), ElementsAre(1305.5, 1306.25));
   EXPECT_EQ(layout.ground_truth_file, folder_ / "groundtruth.txt");
   WriteText("rgb.txt", "1305.5\n");
-  EXPECT_THAT(Complaint(folder_), HasSubstr("rgb.txt: line 1 is '1305.5'"));
+  EXPECT_THAT(Complaint(folder_), HasSubstr("rgb.txt:1: is '1305.5'"));
   WriteText("rgb.txt", "# nothing\n");
   EXPECT_THAT(Complaint(folder_), HasSubstr("rgb.txt: lists no images"));
 }
@@ -158,17 +164,17 @@ TEST_F(LayoutTest, ListsMayCountFrom1970InSmallerUnits) {
   for (const char* zeros : {"", "000", "000000"}) {
     const std::string unit = zeros;
     WriteText("rgb.txt", "1305031102175" + unit + " a.png\n1305031102211" + unit + "\tb.png\n");
-    EXPECT_THAT(Times(FindLayout(folder_, 10.0)), ElementsAre(1305031102.175, 1305031102.211));
+    EXPECT_THAT(Times(FindLayout(folder_, At10Fps())), ElementsAre(1305031102.175, 1305031102.211));
   }
   // One that is no such number, and none is.
   WriteText("rgb.txt", "1305031102175 a.png\n1305031102211.5 b.png\n");
-  EXPECT_THAT(Times(FindLayout(folder_, 10.0)), ElementsAre(1305031102175.0, 1305031102211.5));
+  EXPECT_THAT(Times(FindLayout(folder_, At10Fps())), ElementsAre(1305031102175.0, 1305031102211.5));
 }
 
 TEST_F(LayoutTest, NumbersThatAreNoTimes) {
   for (const std::string word : {"nan", "inf", "-inf", "1e999", "0x10", "1,5", "1.5s", ""}) {
     WriteText("rgb.txt", "0.5 a.png\n" + word + " b.png\n");
-    EXPECT_THAT(Complaint(folder_), HasSubstr("rgb.txt: line 2 is '" + word)) << word;
+    EXPECT_THAT(Complaint(folder_), HasSubstr("rgb.txt:2: is '" + word)) << word;
   }
 }
 
@@ -179,17 +185,17 @@ TEST_F(LayoutTest, Euroc) {
   WriteText("mav0/cam0/sensor.yaml", "x");
   for (const auto& path :
        {folder_, folder_ / "mav0", folder_ / "mav0" / "cam0", folder_ / "mav0" / "cam0" / "."}) {
-    const Layout layout = FindLayout(path, 10.0);
-    EXPECT_EQ(layout.kind, SequenceKind::kEuroc);
+    const Layout layout = FindLayout(path, At10Fps());
+    EXPECT_EQ(layout.form, "EuRoC ASL");
     EXPECT_THAT(Names(layout),
                 ElementsAre("mav0/cam0/data/1403715273262142976.png", "mav0/cam0/data/b.png"));
     EXPECT_THAT(Times(layout), ElementsAre(1403715273.262142976, 1403715273.312142976));
-    EXPECT_EQ(layout.camera_file, folder_ / "mav0" / "cam0" / "sensor.yaml");
+    EXPECT_EQ(layout.camera.value().file, folder_ / "mav0" / "cam0" / "sensor.yaml");
   }
   WriteText("camera.yaml", "x");  // the user's own goes first
-  EXPECT_EQ(FindLayout(folder_, 10.0).camera_file, folder_ / "camera.yaml");
+  EXPECT_EQ(FindLayout(folder_, At10Fps()).camera.value().file, folder_ / "camera.yaml");
   WriteText("mav0/cam0/data.csv", "1.5,a.png\n");
-  EXPECT_THAT(Complaint(folder_), HasSubstr("data.csv: line 1 is '1.5,a.png'"));
+  EXPECT_THAT(Complaint(folder_), HasSubstr("data.csv:1: is '1.5,a.png'"));
   std::filesystem::remove(folder_ / "mav0" / "cam0" / "data.csv");
   EXPECT_THAT(Complaint(folder_), HasSubstr("data.csv: is missing"));
 }

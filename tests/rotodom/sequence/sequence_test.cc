@@ -427,10 +427,10 @@ TEST_F(SequenceTest, Video) {
   if (!WriteVideo("film.avi", 12, 25.0)) GTEST_SKIP() << "OpenCV has no MJPG encoder here";
   WriteText("camera.yaml", "x");
   auto sequence = OpenSequence(folder_ / "film.avi", {});
-  EXPECT_EQ(sequence->kind(), SequenceKind::kVideo);
+  EXPECT_TRUE(sequence->is_video());
   EXPECT_EQ(sequence->image_size(), cv::Size(64, 48));
   EXPECT_EQ(sequence->NumFrames(), 12);
-  EXPECT_EQ(sequence->CameraFile(), folder_ / "camera.yaml");
+  EXPECT_EQ(sequence->camera_reference().value().file, folder_ / "camera.yaml");
   std::vector<Frame> frames = ReadAll(*sequence);
   ASSERT_EQ(frames.size(), 12u);
   EXPECT_EQ(sequence->NumFrames(), 12);

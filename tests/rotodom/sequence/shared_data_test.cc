@@ -11,7 +11,7 @@ namespace {
 
 struct RealSequence {
   std::string folder;
-  SequenceKind kind;
+  std::string form;
   int num_frames;
   cv::Size size;
   double first_s;
@@ -31,15 +31,15 @@ TEST_P(SharedData, IsRecognised) {
   }
   SequenceOptions options;
   const auto sequence = OpenSequence(path, options);
-  EXPECT_EQ(sequence->kind(), expected.kind);
+  EXPECT_EQ(sequence->form(), expected.form);
   EXPECT_EQ(sequence->NumFrames(), expected.num_frames);
   EXPECT_EQ(sequence->image_size(), expected.size);
   EXPECT_NEAR(sequence->timestamps_s()[0], expected.first_s, 1e-6);
   EXPECT_NEAR(sequence->timestamps_s()[1], expected.second_s, 1e-6);
   EXPECT_EQ(sequence->GroundTruthFile().has_value(), expected.brings_ground_truth);
-  ASSERT_EQ(sequence->CameraFile().has_value(), expected.brings_camera);
+  ASSERT_EQ(sequence->camera_reference().has_value(), expected.brings_camera);
   if (expected.brings_camera) {
-    const Camera camera = ReadCamera(*sequence->CameraFile());
+    const Camera camera = ReadCamera(*sequence->camera_reference());
     EXPECT_EQ(MatchToImages(camera, sequence->image_size()).width, expected.size.width);
   }
   const auto frame = sequence->Next();
@@ -51,10 +51,9 @@ INSTANTIATE_TEST_SUITE_P(
     Sequence,
     SharedData,
     testing::Values(
-        RealSequence{
-            "kitti00", SequenceKind::kKittiOdometry, 200, {1241, 376}, 0.0, 0.1037359, true, true},
+        RealSequence{"kitti00", "KITTI odometry", 200, {1241, 376}, 0.0, 0.1037359, true, true},
         RealSequence{"tum_fr1_rpy",
-                     SequenceKind::kTumRgbd,
+                     "TUM RGB-D",
                      480,
                      {640, 480},
                      1305031229.528748,
@@ -62,31 +61,17 @@ INSTANTIATE_TEST_SUITE_P(
                      false,
                      true},
         RealSequence{"euroc_v101_keyframes",
-                     SequenceKind::kEuroc,
+                     "EuRoC ASL",
                      100,
                      {752, 480},
                      1403715273.262142976,
                      1403715280.562142976,
                      true,
                      true},
-        RealSequence{"7scenes_kitchen",
-                     SequenceKind::kImageFolder,
-                     400,
-                     {640, 480},
-                     0.0,
-                     1.0 / 30.0,
-                     false,
-                     true},
-        RealSequence{"pan720",
-                     SequenceKind::kImageFolder,
-                     361,
-                     {640, 480},
-                     1000.0,
-                     1000.033333,
-                     false,
-                     true},
         RealSequence{
-            "cmu0", SequenceKind::kImageFolder, 38, {1300, 867}, 0.0, 1.0 / 30.0, false, false}),
+            "7scenes_kitchen", "image folder", 400, {640, 480}, 0.0, 1.0 / 30.0, false, true},
+        RealSequence{"pan720", "image folder", 361, {640, 480}, 1000.0, 1000.033333, false, true},
+        RealSequence{"cmu0", "image folder", 38, {1300, 867}, 0.0, 1.0 / 30.0, false, false}),
     [](const auto& test) { return "Of_" + test.param.folder; });
 
 }  // namespace
