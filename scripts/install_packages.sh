@@ -10,7 +10,7 @@ packages=(
   # tools
   cmake g++ ninja-build pkg-config
   # rotodom
-  libeigen3-dev libopencv-dev libyaml-cpp-dev
+  libeigen3-dev libheif-dev libopencv-dev libyaml-cpp-dev
   # krot and ba
   coinor-libclp-dev libceres-dev libgoogle-glog-dev
   # output and apps

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <array>
 #include <cctype>
+#include <cmath>
 #include <cstddef>
 #include <cstdint>
 #include <fstream>
@@ -15,6 +16,9 @@
 #include <opencv2/core.hpp>
 #include <opencv2/imgcodecs.hpp>
 #include <opencv2/imgproc.hpp>
+
+#include "rotodom/sequence/heif_file.h"
+#include "rotodom/types/text_file.h"
 
 namespace rotslam {
 namespace {
@@ -165,27 +169,117 @@ bool IsKnownFormat(const Bytes& bytes) {
   const bool is_tiff = Has(bytes, 0, {"II\x2a\0", 4}) || Has(bytes, 0, {"MM\0\x2a", 4});
   const bool is_pnm = bytes.size() >= 3 && bytes[0] == 'P' && bytes[1] >= '1' && bytes[1] <= '6' &&
                       std::isspace(bytes[2]) != 0;
-  return IsJpeg(bytes) || IsPng(bytes) || is_tiff || is_pnm || Has(bytes, 0, "BM");
+  return IsHeif(bytes) || IsJpeg(bytes) || IsPng(bytes) || is_tiff || is_pnm || Has(bytes, 0, "BM");
+}
+
+// ---- depth
+
+// Floating-point pixels that may lie outside of what becomes 0 to 255, at either end: dead and
+// saturated ones.
+constexpr double kRareFloats = 1e-3;
+
+bool IsFloat(const cv::Mat& image) { return image.depth() == CV_32F || image.depth() == CV_64F; }
+
+// The largest value; transparency does not count.
+double LargestOf(const cv::Mat& image) {
+  cv::Mat colours = image;
+  if (image.channels() == 4) cv::cvtColor(image, colours, cv::COLOR_BGRA2BGR);
+  if (image.channels() == 2) cv::extractChannel(image, colours, 0);
+  double largest = 0.0;
+  cv::minMaxLoc(colours.reshape(1), nullptr, &largest);
+  return largest;
+}
+
+// Some finite values of the image, evenly spread.
+void AddSample(const cv::Mat& image, std::vector<float>& sample) {
+  constexpr std::size_t kMostValues = 100'000;
+  cv::Mat values;
+  image.convertTo(values, CV_32F);
+  values = values.reshape(1);
+  const std::size_t step = values.total() / kMostValues + 1;
+  const std::size_t columns = static_cast<std::size_t>(values.cols);
+  for (std::size_t k = 0; k < values.total(); k += step) {
+    const float value =
+        values.at<float>(static_cast<int>(k / columns), static_cast<int>(k % columns));
+    if (std::isfinite(value)) sample.push_back(value);
+  }
+}
+
+double QuantileOf(std::vector<float>& sample, double share) {
+  const auto place = sample.begin() + static_cast<std::ptrdiff_t>(
+                                          share * static_cast<double>(sample.size() - 1) + 0.5);
+  std::nth_element(sample.begin(), place, sample.end());
+  return *place;
 }
 
 DecodedImage Failed(std::string problem) { return {{}, std::move(problem)}; }
 
 }  // namespace
 
-DecodedImage ToEightBits(cv::Mat image) {
+PixelScale FindPixelScale(const std::vector<cv::Mat>& images) {
+  PixelScale scale;
+  double largest = -1.0;
+  std::vector<float> sample;
+  for (const cv::Mat& image : images) {
+    if (image.depth() == CV_16U) largest = std::max(largest, LargestOf(image));
+    if (IsFloat(image)) AddSample(image, sample);
+  }
+  for (const int bits : {16, 14, 12, 10, 8}) {
+    if (largest >= 0.0 && largest < static_cast<double>(1 << bits)) scale.bits = bits;
+  }
+  if (!sample.empty()) {
+    scale.low = QuantileOf(sample, kRareFloats);
+    scale.high = QuantileOf(sample, 1.0 - kRareFloats);
+    if (!(scale.high > scale.low)) scale.high = scale.low + 1.0;
+  }
+  return scale;
+}
+
+std::optional<std::string> Describe(const PixelScale& scale, int depth) {
+  if (depth == CV_32F || depth == CV_64F) {
+    return "pixels are floating-point numbers: " + FormatNumber("%.4g", scale.low) + " to " +
+           FormatNumber("%.4g", scale.high) + " become 0 to 255";
+  }
+  if (depth != CV_16U) return std::nullopt;
+  if (scale.bits == 16) return "pixels are 16 bit: divided by 257";
+  return "pixels are " + std::to_string(scale.bits) + " bit in 16: " +
+         (scale.bits == 8 ? "taken as they are"
+                          : "divided by " + std::to_string(1 << (scale.bits - 8)));
+}
+
+DecodedImage ToEightBits(cv::Mat image, const PixelScale& scale) {
   if (image.channels() == 4) cv::cvtColor(image, image, cv::COLOR_BGRA2BGR);
+  if (image.channels() == 2) cv::extractChannel(image, image, 0);
   if (image.depth() == CV_16U) {
+    const double divisor = scale.bits == 16 ? 257.0 : static_cast<double>(1 << (scale.bits - 8));
     cv::Mat scaled;
-    image.convertTo(scaled, CV_8U, 255.0 / 65535.0);
+    image.convertTo(scaled, CV_8U, 1.0 / divisor);
     image = scaled;
+  } else if (IsFloat(image)) {
+    const int num_channels = image.channels();
+    cv::Mat values;
+    image.convertTo(values, CV_32F);
+    values = values.reshape(1);
+    cv::patchNaNs(values, scale.low);
+    // Infinite pixels have no place among integers.
+    values = cv::min(cv::max(values, scale.low), scale.high);
+    const double factor = 255.0 / (scale.high - scale.low);
+    cv::Mat scaled;
+    values.convertTo(scaled, CV_8U, factor, -factor * scale.low);
+    image = scaled.reshape(num_channels);
   }
   if (image.depth() == CV_8U && (image.channels() == 1 || image.channels() == 3)) {
     return {std::move(image), {}};
   }
-  return Failed("pixels are neither 8 nor 16 bits, or not of 1, 3 or 4 channels");
+  return Failed("pixels are neither 8 nor 16 bits nor floating-point, or not of 1 to 4 channels");
 }
 
-DecodedImage ReadImageFile(const std::filesystem::path& file) {
+DecodedImage ToEightBits(cv::Mat image) {
+  const PixelScale scale = FindPixelScale({image});
+  return ToEightBits(std::move(image), scale);
+}
+
+DecodedImage DecodeImageFile(const std::filesystem::path& file) {
   // A folder can be opened, too, and then says that it is of 2^63 bytes.
   std::error_code error;
   if (!std::filesystem::is_regular_file(file, error)) return Failed("file cannot be opened");
@@ -198,7 +292,8 @@ DecodedImage ReadImageFile(const std::filesystem::path& file) {
   }
   if (!stream.is_open() || stream.bad()) return Failed("file cannot be opened");
   if (bytes.empty()) return Failed("file is empty");
-  if (!IsKnownFormat(bytes)) return Failed("not a PNG, JPEG, TIFF, BMP, PNM or WebP file");
+  if (!IsKnownFormat(bytes)) return Failed("not a PNG, JPEG, TIFF, BMP, PNM, WebP or HEIC file");
+  if (IsHeif(bytes)) return DecodeHeif(bytes);
   if (IsJpeg(bytes) && IsCutOffJpeg(bytes)) return Failed("JPEG data are cut off");
   if (IsPng(bytes)) {
     if (std::string damage = DamageOfPng(bytes); !damage.empty()) return Failed(std::move(damage));
@@ -212,7 +307,17 @@ DecodedImage ReadImageFile(const std::filesystem::path& file) {
     image.release();  // such as a header that claims a size beyond OpenCV's limit
   }
   if (image.empty()) return Failed("image cannot be decoded");
-  return ToEightBits(std::move(image));
+  return {std::move(image), {}};
+}
+
+DecodedImage ReadImageFile(const std::filesystem::path& file, const PixelScale& scale) {
+  DecodedImage decoded = DecodeImageFile(file);
+  return decoded.image.empty() ? decoded : ToEightBits(std::move(decoded.image), scale);
+}
+
+DecodedImage ReadImageFile(const std::filesystem::path& file) {
+  DecodedImage decoded = DecodeImageFile(file);
+  return decoded.image.empty() ? decoded : ToEightBits(std::move(decoded.image));
 }
 
 }  // namespace rotslam

@@ -1,25 +1,50 @@
 #pragma once
 
 #include <filesystem>
+#include <optional>
 #include <string>
+#include <vector>
 
 #include <opencv2/core/mat.hpp>
 
 namespace rotslam {
 
-/// An image of 8 bits and 1 or 3 channels (blue, green, red); or an empty one, and why.
+/// An image, or an empty one, and why.
 struct DecodedImage {
   cv::Mat image;
   std::string problem;  // in one line; empty when the image is not
 };
 
-/// Reads an image of 8 or 16 bits as its pixels lie: the orientation that EXIF data ask for is not
-/// applied, transparency is dropped. Damaged and cut off PNG and JPEG files are noticed, where the
+/// How pixels of more than 8 bits become 8 bits, the same for all images of a sequence.
+struct PixelScale {
+  int bits = 16;        // that 16-bit pixels use: 8, 10, 12, 14 or 16
+  double low = 0.0;     // floating-point pixels that become 0
+  double high = 255.0;  // and 255
+};
+
+/// The scale that fits images as DecodeImageFile gives them, those of 8 bits and empty ones left
+/// out. The largest 16-bit value tells the bits; of floating-point pixels, all but one in a
+/// thousand at either end fit between `low` and `high`.
+PixelScale FindPixelScale(const std::vector<cv::Mat>& images);
+
+/// What becomes of pixels of this depth, in one line: "pixels are 12 bit in 16: divided by 16";
+/// nullopt for 8 bits.
+std::optional<std::string> Describe(const PixelScale& scale, int depth);
+
+/// Reads an image as its pixels lie, of whatever depth: the orientation that EXIF data or a HEIC
+/// file ask for is not applied. Damaged and cut off PNG and JPEG files are noticed, where the
 /// decoder would fill in grey; so are headers that claim far more pixels than the file can hold,
 /// before memory is taken for them. Whatever the file holds, this does not throw.
-DecodedImage ReadImageFile(const std::filesystem::path& file);
+DecodedImage DecodeImageFile(const std::filesystem::path& file);
 
-/// The same for pixels in memory.
+/// `image` with 8 bits and 1 or 3 channels (blue, green, red); transparency is dropped.
+DecodedImage ToEightBits(cv::Mat image, const PixelScale& scale);
+
+/// The same with the scale that the image alone tells.
 DecodedImage ToEightBits(cv::Mat image);
+
+/// DecodeImageFile and ToEightBits at once.
+DecodedImage ReadImageFile(const std::filesystem::path& file, const PixelScale& scale);
+DecodedImage ReadImageFile(const std::filesystem::path& file);
 
 }  // namespace rotslam

@@ -1,7 +1,13 @@
 #include "rotodom/sequence/layout.h"
 
+#include <algorithm>
+#include <string_view>
+#include <system_error>
+
 #include "rotodom/sequence/image_list.h"
 #include "rotodom/sequence/sequence_form.h"
+#include "rotodom/sequence/times.h"
+#include "rotodom/types/text_file.h"
 
 namespace rotslam {
 namespace {
@@ -12,6 +18,38 @@ namespace fs = std::filesystem;
 fs::path CleanPath(const fs::path& given) {
   const fs::path path = fs::absolute(given).lexically_normal();
   return path.filename().empty() ? path.parent_path() : path;
+}
+
+// Says where frames are missing in the times.
+void NoteGaps(Layout& layout) {
+  // A frame that is missing makes a step of two.
+  constexpr double kLeastGap = 1.75;
+  // More gaps than that, and the frames were never meant to be even.
+  constexpr double kMostGaps = 0.2;
+  std::vector<double> steps;
+  for (std::size_t k = 1; k < layout.entries.size(); ++k) {
+    steps.push_back(layout.entries[k].timestamp_s - layout.entries[k - 1].timestamp_s);
+  }
+  if (steps.size() < 2) return;
+  const auto longest = std::max_element(steps.begin(), steps.end());
+  const auto frame = longest - steps.begin();
+  const std::string text =
+      FormatNumber("%.3g", *longest) + " s after frame " + std::to_string(frame);
+  const double shortest_s = *std::min_element(steps.begin(), steps.end());
+  std::vector<double> sorted = steps;
+  const auto middle = sorted.begin() + static_cast<std::ptrdiff_t>(sorted.size() / 2);
+  std::nth_element(sorted.begin(), middle, sorted.end());
+  const auto is_gap = [&](double step) { return step > kLeastGap * *middle; };
+  const auto num_gaps = std::count_if(steps.begin(), steps.end(), is_gap);
+  if (num_gaps == 0 || shortest_s <= 0.0) return;
+  if (static_cast<double>(num_gaps) > kMostGaps * static_cast<double>(steps.size())) {
+    layout.notes.push_back("times are uneven: " + FormatNumber("%.3g", shortest_s) + " to " +
+                           FormatNumber("%.3g", *longest) + " s from frame to frame");
+  } else {
+    layout.notes.push_back("times have " + std::to_string(num_gaps) +
+                           (num_gaps == 1 ? " gap: " : " gaps, the longest ") + text +
+                           " (frames are " + FormatNumber("%.3g", *middle) + " s apart)");
+  }
 }
 
 }  // namespace
@@ -34,7 +72,37 @@ Layout FindLayout(const fs::path& path, const SequenceOptions& options) {
   const SequenceForm& form = FindSequenceForm(path);
   Layout layout = form.list(CleanPath(path), options);
   layout.form = form.name;
+  if (layout.times_are_made_up) layout.notes.push_back(MadeUpTimesNote(options.fps));
+  if (!layout.times_are_made_up) NoteGaps(layout);
   return layout;
+}
+
+bool NaturalLess(const std::string& a, const std::string& b) {
+  const auto is_digit = [](char c) { return c >= '0' && c <= '9'; };
+  std::size_t i = 0;
+  std::size_t j = 0;
+  while (i < a.size() && j < b.size()) {
+    if (!is_digit(a[i]) || !is_digit(b[j])) {
+      if (a[i] != b[j]) return a[i] < b[j];
+      ++i;
+      ++j;
+      continue;
+    }
+    const auto run = [&](const std::string& text, std::size_t& from) {
+      while (from < text.size() && text[from] == '0') ++from;
+      const std::size_t begin = from;
+      while (from < text.size() && is_digit(text[from])) ++from;
+      return std::string_view(text).substr(begin, from - begin);
+    };
+    const std::string_view number_a = run(a, i);
+    const std::string_view number_b = run(b, j);
+    if (number_a.size() != number_b.size()) return number_a.size() < number_b.size();
+    if (number_a != number_b) return number_a < number_b;
+  }
+  const std::size_t rest_a = a.size() - i;
+  const std::size_t rest_b = b.size() - j;
+  if (rest_a != rest_b) return rest_a < rest_b;
+  return a < b;  // equal but for leading zeros
 }
 
 }  // namespace rotslam

@@ -14,6 +14,7 @@ namespace rotslam {
 struct ImageEntry {
   std::filesystem::path file;
   double timestamp_s = 0.0;
+  int line = 0;  // of Layout::time_list that tells the time; 0 where none does
 };
 
 /// What a form of input (SequenceForm) found at a path.
@@ -22,6 +23,7 @@ struct Layout {
   bool is_video = false;            // a file whose frames are numbered, without names of their own
   std::filesystem::path folder;     // where the images are; the file itself for a video
   std::vector<ImageEntry> entries;  // in order; empty where the form opens the frames itself
+  std::filesystem::path time_list;  // file that ImageEntry::line is of; may be empty
   std::string times_source;         // a short phrase: "times.txt", "file names (ns since 1970)"
   bool times_are_made_up = false;   // the frames are numbered and SequenceOptions::fps is believed
   std::optional<CameraReference> camera;                   // calibration that lies with the images
@@ -36,9 +38,5 @@ Layout FindLayout(const std::filesystem::path& path, const SequenceOptions& opti
 
 /// Order of names in which runs of digits count as numbers: frame2 < frame10.
 bool NaturalLess(const std::string& a, const std::string& b);
-
-/// Seconds that file names (without extension) tell, if all of them tell one in the same way: a
-/// number with a decimal point, or ms, us or ns since 1970 of a date from 2000 to 2099.
-std::optional<std::vector<double>> TimestampsFromNames(const std::vector<std::string>& stems);
 
 }  // namespace rotslam

@@ -1,32 +1,60 @@
 #pragma once
 
 #include <cstdint>
-#include <filesystem>
 #include <optional>
 #include <string>
 #include <string_view>
 #include <vector>
 
-#include "rotodom/sequence/image_list.h"
-
 namespace rotslam {
 
+/// Times of frames, as a list or the names of files tell them.
+struct SpokenTimes {
+  std::vector<double> times_s;
+  std::string unit;  // "seconds", "ns since 1970", "ms", "dates"
+};
+
 bool AllDigits(std::string_view text);
+
+/// A whole number and nothing else; nullopt also where it has more than 63 bits.
 std::optional<std::int64_t> ParseInteger(std::string_view text);
 
-/// A finite number and nothing else.
-std::optional<double> ParseSeconds(std::string_view text);
+/// A finite number and nothing else; a comma may stand for the decimal point.
+std::optional<double> ParseNumber(std::string_view text);
+
+/// Seconds since 1970 of "2011-09-26 13:02:25.964389445", with a blank or a T between date and
+/// time.
+std::optional<double> ParseDate(std::string_view text);
 
 /// ticks / ticks_per_second, without losing a digit before the division.
 double SecondsFromTicks(std::int64_t ticks, std::int64_t ticks_per_second);
 
+/// The unit that the title of a column names: 1, 1e3, 1e6 or 1e9 ticks a second; 0 where it names
+/// none. "timestamp [ns]", "t_us".
+std::int64_t TicksOfTitle(std::string_view title);
+
+/// What SpokenTimes are read from whose unit nothing tells: whole numbers that differ by a few.
+enum class UnclearTimes { kAreNone, kAreSeconds };
+
+/// The times of a column of a list: numbers or dates. The unit of numbers is `ticks_per_second`
+/// when that is not 0, else what makes them dates from 2000 to 2099, else what makes the median
+/// step between them a frame rate that cameras have: whole numbers that step by 33 count
+/// milliseconds, by 33333 microseconds, and so on.
+/// @return  nullopt where a word is no time or, for kAreNone, the numbers are those of frames.
+std::optional<SpokenTimes> TimesOfWords(const std::vector<std::string>& words,
+                                        UnclearTimes unclear,
+                                        std::int64_t ticks_per_second = 0);
+
+/// The times that file names (without extension) tell, if all of them tell one in the same way,
+/// with the same text around it: seconds with a decimal point; ms, us or ns since 1970 of a date
+/// from 2000 to 2099; us or ns since a camera was switched on; seconds and nanoseconds, `sec_nsec`
+/// or `sec.nsec`, whose nanoseconds may lack leading zeros; `20260115_063000123`.
+std::optional<SpokenTimes> TimesOfNames(const std::vector<std::string>& stems);
+
 /// What Layout::times_source says of times that are made up: "made up at 30 frames a second".
 std::string MadeUpTimes(double fps);
 
-/// The times of a list, the first word of each line: seconds, or where all of them say so as file
-/// names do, ms, us or ns since 1970.
-std::vector<double> TimesOf(const std::filesystem::path& list,
-                            const std::vector<TextLine>& lines,
-                            const std::string& expected);
+/// The note on them, which says what to do.
+std::string MadeUpTimesNote(double fps);
 
 }  // namespace rotslam

@@ -5,6 +5,7 @@
 
 #include "rotodom/sequence/layout.h"
 #include "rotodom/sequence/sequence.h"
+#include "rotodom/sequence/times.h"
 #include "tests/fuzz/fuzz_target.h"
 
 namespace rotslam {
@@ -58,7 +59,7 @@ const RegisterFuzzTarget image_names("image_names",
                                          names.emplace_back(bytes.substr(begin, end - begin));
                                          begin = end + 1;
                                        }
-                                       TimestampsFromNames(names);
+                                       TimesOfNames(names);
                                        // Sorting asks for an order; std::sort runs out of the array
                                        // without one.
                                        for (const std::string& a : names) {

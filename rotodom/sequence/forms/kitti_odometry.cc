@@ -1,52 +1,52 @@
+#include <algorithm>
+
 #include "rotodom/sequence/image_list.h"
+#include "rotodom/sequence/image_times.h"
 #include "rotodom/sequence/sequence_form.h"
-#include "rotodom/sequence/times.h"
 
 namespace rotslam::forms {
 namespace {
 
 namespace fs = std::filesystem;
 
+// The first of the four cameras that is there; the path itself where none is.
+fs::path KittiImages(const fs::path& path) {
+  for (const char* name : {"image_0", "image_2", "image_1", "image_3"}) {
+    if (IsFolder(path / name)) return path / name;
+  }
+  return path;
+}
+
+// "P2" for `image_2`, where `calib.txt` has a row of that name.
+std::string ProjectionOf(const fs::path& image_folder, const fs::path& calibration) {
+  const std::string folder = image_folder.filename().string();
+  const std::string name = "P" + folder.substr(std::min(folder.size(), folder.find('_') + 1));
+  const std::vector<TextLine> lines = ReadLines(calibration);
+  const bool is_there = std::any_of(lines.begin(), lines.end(), [&](const TextLine& line) {
+    return line.text.starts_with(name + ":") || line.text.starts_with(name + " ");
+  });
+  return is_there ? name : std::string();
+}
+
 Layout ListKitti(const fs::path& image_folder) {
   const fs::path root = image_folder.parent_path();
   Layout layout;
-  layout.times_source = "times.txt";
   layout.folder = image_folder;
   const fs::path list = root / "times.txt";
   if (!IsFile(list)) {
     Fail(list, "is missing; give " + image_folder.string() + " to take the images without it");
   }
-  const std::vector<TextLine> lines = ReadLines(list);
-  for (const TextLine& line : lines) {
-    if (line.text.find_first_of(" \t") != std::string::npos) FailAtLine(list, line, "seconds");
+  AddNumberedImages(ImagesIn(image_folder), list, layout);
+  layout.camera = FirstCamera({root / "camera.yaml"});
+  if (!layout.camera && IsFile(root / "calib.txt")) {
+    layout.camera = {root / "calib.txt", ProjectionOf(image_folder, root / "calib.txt")};
   }
-  const std::vector<double> times_s = TimesOf(list, lines, "seconds");
-  const std::vector<fs::path> files = ImagesIn(image_folder);
-  if (files.empty()) Fail(image_folder, "holds no images");
-  for (std::size_t k = 0; k < files.size(); ++k) {
-    // The name is the number of the line, so a part of the images may be given with all the times.
-    const std::string stem = files[k].stem().string();
-    const auto number = AllDigits(stem) ? ParseInteger(stem) : std::nullopt;
-    const auto row = number ? static_cast<std::size_t>(*number) : k;
-    if (row >= times_s.size()) {
-      Fail(list, "has " + std::to_string(times_s.size()) + " times, none for " + files[k].string());
-    }
-    layout.entries.push_back({files[k], times_s[row]});
-  }
-  layout.camera = FirstCamera({root / "camera.yaml", root / "calib.txt"});
-  const fs::path poses = (root.filename().string() + ".txt");
   layout.ground_truth_file = FindGroundTruth(root);
   if (!layout.ground_truth_file) {
+    const std::string poses = root.filename().string() + ".txt";
     layout.ground_truth_file = FirstFile({root.parent_path().parent_path() / "poses" / poses});
   }
   return layout;
-}
-
-fs::path KittiImages(const fs::path& path) {
-  for (const char* name : {"image_0", "image_2"}) {
-    if (IsFolder(path / name)) return path / name;
-  }
-  return path;
 }
 
 }  // namespace
@@ -55,7 +55,8 @@ SequenceForm SequenceFormKittiOdometry() {
   SequenceForm form;
   form.name = "KITTI odometry";
   form.description =
-      "`image_0/` (else `image_2/`) and `times.txt`; or the path is an `image_*` of it";
+      "`image_0/` (else `image_2/`) and `times.txt`; or the folder is an `image_*` beside "
+      "`times.txt`";
   form.recognises = [](const fs::path& path) {
     return KittiImages(path) != path || (path.filename().string().starts_with("image_") &&
                                          IsFile(path.parent_path() / "times.txt"));

@@ -1,28 +1,55 @@
 #include "rotodom/sequence/image_list.h"
+#include "rotodom/sequence/image_times.h"
 #include "rotodom/sequence/sequence_form.h"
-#include "rotodom/sequence/times.h"
 
 namespace rotslam::forms {
 namespace {
 
 namespace fs = std::filesystem;
 
-Layout ListTum(const fs::path& root) {
-  Layout layout;
-  layout.times_source = "rgb.txt";
-  layout.folder = root;
-  const fs::path list = root / "rgb.txt";
-  const std::vector<TextLine> lines = ReadLines(list);
-  const std::vector<double> times_s = TimesOf(list, lines, "'seconds file name'");
-  for (std::size_t k = 0; k < lines.size(); ++k) {
-    const std::string_view text = lines[k].text;
-    const std::size_t blank = text.find_first_of(" \t");
-    if (blank == std::string_view::npos) FailAtLine(list, lines[k], "'seconds file name'");
-    layout.entries.push_back({root / std::string(Trimmed(text.substr(blank))), times_s[k]});
+std::optional<fs::path> TumList(const fs::path& root) {
+  return FirstFile({root / "rgb.txt",
+                    root / "associations.txt",
+                    root / "associated.txt",
+                    root / "association.txt",
+                    root / "associate.txt"});
+}
+
+// Trajectories of ICL-NUIM: `livingRoom2.gt.freiburg`, `traj2n.gt.freiburg`.
+std::optional<fs::path> IclNuimTruth(const fs::path& root) {
+  std::error_code error;
+  for (fs::directory_iterator entries(root, error), end; !error && entries != end;
+       entries.increment(error)) {
+    if (entries->path().filename().string().ends_with(".gt.freiburg")) return entries->path();
   }
-  if (layout.entries.empty()) Fail(list, "lists no images");
-  layout.camera = FirstCamera({root / "camera.yaml"});
+  return std::nullopt;
+}
+
+// As its authors give it; they render y upwards, which the images do not show.
+Camera IclNuimCamera() {
+  Camera camera;
+  camera.width = 640;
+  camera.height = 480;
+  camera.fx = 481.2;
+  camera.fy = 480.0;
+  camera.cx = 319.5;
+  camera.cy = 239.5;
+  return camera;
+}
+
+Layout ListTumRgbd(const fs::path& root, const SequenceOptions& options) {
+  Layout layout;
+  layout.folder = root;
+  const std::optional<fs::path> list = TumList(root);
+  if (!list) Fail(root / "rgb.txt", "is missing");
+  AddListedImages(*list, {root, root / "rgb"}, options, layout);
+  layout.camera = FindCamera({root}, layout.notes);
   layout.ground_truth_file = FindGroundTruth(root);
+  if (const auto truth = IclNuimTruth(root)) {
+    layout.own_camera = IclNuimCamera();
+    if (!layout.ground_truth_file) layout.ground_truth_file = truth;
+    if (!layout.camera) layout.notes.push_back("the camera is that of ICL-NUIM, f = (481.2, 480)");
+  }
   return layout;
 }
 
@@ -31,9 +58,12 @@ Layout ListTum(const fs::path& root) {
 SequenceForm SequenceFormTumRgbd() {
   SequenceForm form;
   form.name = "TUM RGB-D";
-  form.description = "`rgb.txt`: a time and the name of an image in each line";
-  form.recognises = [](const fs::path& path) { return IsFile(path / "rgb.txt"); };
-  form.list = [](const fs::path& path, const SequenceOptions&) { return ListTum(path); };
+  form.description =
+      "also ICL-NUIM and Bonn: `rgb.txt`, `associations.txt` or `associated.txt`, a time and the "
+      "name "
+      "of an image in each line";
+  form.recognises = [](const fs::path& path) { return TumList(path).has_value(); };
+  form.list = ListTumRgbd;
   return form;
 }
 

@@ -6,7 +6,6 @@
 
 #include "rotodom/sequence/image_list.h"
 #include "rotodom/sequence/sequence_form.h"
-#include "rotodom/sequence/times.h"
 
 namespace rotslam::forms {
 namespace {

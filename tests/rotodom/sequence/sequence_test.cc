@@ -1,6 +1,7 @@
 #include "rotodom/sequence/sequence.h"
 
 #include <bitset>
+#include <cmath>
 #include <cstdint>
 #include <fstream>
 #include <initializer_list>
@@ -165,7 +166,7 @@ TEST_F(SequenceTest, GoesOnBehindAnUnreadableImage) {
   const std::vector<Frame> frames = ReadAll(*sequence);
   ASSERT_EQ(frames.size(), 10u);
   EXPECT_EQ(frames[0].problem, "file is empty");
-  EXPECT_EQ(frames[4].problem, "not a PNG, JPEG, TIFF, BMP, PNM or WebP file");
+  EXPECT_EQ(frames[4].problem, "not a PNG, JPEG, TIFF, BMP, PNM, WebP or HEIC file");
   EXPECT_EQ(frames[6].problem, "image is 12x16, the first readable one is 16x12");
   for (const Frame& frame : frames) EXPECT_EQ(frame.image.empty(), !frame.problem.empty());
 }
@@ -349,7 +350,7 @@ TEST_F(SequenceTest, OpensNoOtherFormats) {
   const std::vector<Frame> frames = ReadAll(*OpenSequence(folder_, {}));
   ASSERT_EQ(frames.size(), 10u);
   for (int k = 0; k < 4; ++k) {
-    EXPECT_EQ(frames[k].problem, "not a PNG, JPEG, TIFF, BMP, PNM or WebP file") << k;
+    EXPECT_EQ(frames[k].problem, "not a PNG, JPEG, TIFF, BMP, PNM, WebP or HEIC file") << k;
   }
   for (int k = 4; k < 10; ++k) EXPECT_EQ(frames[k].problem, "") << k;
 }
@@ -377,15 +378,76 @@ TEST_F(SequenceTest, BringsEveryPixelFormatToEightBits) {
   WriteImage("4.png", cv::Scalar(257.0 * 10, 257.0 * 20, 257.0 * 30, 65535.0), CV_16UC4);
   WriteImage("5.tiff", cv::Scalar(0.5), CV_32FC1);
   const auto sequence = OpenSequence(folder_, {});
+  EXPECT_EQ(sequence->image_size(), cv::Size(16, 12));
   const std::vector<Frame> frames = ReadAll(*sequence);
   ASSERT_EQ(frames.size(), 6u);
   for (const int k : {0, 1, 2, 4}) {
     ASSERT_EQ(frames[k].image.type(), CV_8UC3) << k << ": " << frames[k].problem;
     EXPECT_EQ(frames[k].image.at<cv::Vec3b>(3, 4), cv::Vec3b(10, 20, 30)) << k;
   }
-  ASSERT_EQ(frames[3].image.type(), CV_8UC1);
+  for (const int k : {3, 5}) ASSERT_EQ(frames[k].image.type(), CV_8UC1) << frames[k].problem;
   EXPECT_EQ(frames[3].image.at<unsigned char>(3, 4), 10);
-  EXPECT_THAT(frames[5].problem, HasSubstr("neither 8 nor 16 bits"));
+}
+
+// The largest value of the sequence, not of an image, tells the bits.
+TEST_F(SequenceTest, FindsTheBitsOfPixelsOnceForTheSequence) {
+  struct Case {
+    double largest;
+    double divisor;
+    const char* note;
+  };
+  for (const Case& test : {Case{255, 1, "pixels are 8 bit in 16: taken as they are"},
+                           Case{1000, 4, "pixels are 10 bit in 16: divided by 4"},
+                           Case{4095, 16, "pixels are 12 bit in 16: divided by 16"},
+                           Case{16000, 64, "pixels are 14 bit in 16: divided by 64"},
+                           Case{65000, 257, "pixels are 16 bit: divided by 257"}}) {
+    WriteImage("0.png", cv::Scalar(208), CV_16UC1);
+    WriteImage("1.png", cv::Scalar(test.largest, 0, 208), CV_16UC3);
+    WriteImage("2.png", cv::Scalar(0, 0, 0, 65535), CV_16UC4);
+    const auto sequence = OpenSequence(folder_, {});
+    EXPECT_THAT(sequence->notes(), testing::Contains(test.note));
+    const std::vector<Frame> frames = ReadAll(*sequence);
+    EXPECT_EQ(frames[0].image.at<unsigned char>(3, 4), std::lround(208 / test.divisor));
+    EXPECT_EQ(frames[1].image.at<cv::Vec3b>(3, 4)[0],
+              std::min(255L, std::lround(test.largest / test.divisor)));
+    EXPECT_EQ(frames[1].image.at<cv::Vec3b>(3, 4)[2], std::lround(208 / test.divisor));
+  }
+}
+
+TEST_F(SequenceTest, ScalesFloatingPointImagesAlike) {
+  cv::Mat ramp(40, 50, CV_32FC1);
+  for (int k = 0; k < 2000; ++k) ramp.at<float>(k / 50, k % 50) = static_cast<float>(k) / 2000.0F;
+  cv::imwrite((folder_ / "0.tiff").string(), ramp);
+  cv::imwrite((folder_ / "1.tiff").string(), cv::Mat(0.5F * ramp));
+  ramp.at<float>(1, 1) = std::numeric_limits<float>::quiet_NaN();
+  ramp.at<float>(1, 2) = std::numeric_limits<float>::infinity();
+  ramp.at<float>(1, 3) = -1e30F;
+  cv::imwrite((folder_ / "2.tiff").string(), ramp);
+  const auto sequence = OpenSequence(folder_, {});
+  EXPECT_THAT(sequence->notes(),
+              testing::Contains(testing::StartsWith("pixels are floating-point numbers: ")));
+  const std::vector<Frame> frames = ReadAll(*sequence);
+  ASSERT_EQ(frames.size(), 3u);
+  for (const Frame& frame : frames) ASSERT_EQ(frame.image.type(), CV_8UC1) << frame.problem;
+  EXPECT_NEAR(frames[0].image.at<unsigned char>(20, 0), 127, 1);
+  EXPECT_NEAR(frames[1].image.at<unsigned char>(20, 0), 64, 1);
+  EXPECT_NEAR(frames[2].image.at<unsigned char>(20, 0), 127, 1);
+  EXPECT_EQ(frames[2].image.at<unsigned char>(1, 1), 0);
+  EXPECT_EQ(frames[2].image.at<unsigned char>(1, 2), 255);
+  EXPECT_EQ(frames[2].image.at<unsigned char>(1, 3), 0);
+}
+
+// OpenCV writes colours as LogLuv, good to about one in a hundred.
+TEST_F(SequenceTest, ReadsDoublesAndColourFloats) {
+  WriteImage("0.tiff", cv::Scalar(0.0, 0.5, 1.0), CV_32FC3);
+  WriteImage("1.tiff", cv::Scalar(1.0), CV_64FC1);
+  const std::vector<Frame> frames = ReadAll(*OpenSequence(folder_, {}));
+  ASSERT_EQ(frames.size(), 2u);
+  ASSERT_EQ(frames[0].image.type(), CV_8UC3) << frames[0].problem;
+  const auto pixel = frames[0].image.at<cv::Vec3b>(3, 4);
+  for (int c = 0; c < 3; ++c) EXPECT_NEAR(pixel[c], 127.5 * c, 3.0);
+  ASSERT_EQ(frames[1].image.type(), CV_8UC1) << frames[1].problem;
+  EXPECT_NEAR(frames[1].image.at<unsigned char>(3, 4), 255, 3.0);
 }
 
 TEST_F(SequenceTest, RefusesTimestampsThatDoNotIncrease) {
@@ -393,7 +455,8 @@ TEST_F(SequenceTest, RefusesTimestampsThatDoNotIncrease) {
   WriteText("rgb.txt", "1.0 a.png\n2.5 b.png\n2.5 c.png\n");
   EXPECT_THAT(
       Complaint(folder_),
-      testing::AllOf(HasSubstr("c.png: timestamp 2.500000000 s is not later"), HasSubstr("b.png")));
+      testing::AllOf(HasSubstr("rgb.txt:3: c.png: timestamp 2.500000000 s is not later"),
+                     HasSubstr("b.png in line 2")));
   WriteText("rgb.txt", "1.0 a.png\n0.5 b.png\n");
   EXPECT_THAT(Complaint(folder_), HasSubstr("b.png: timestamp 0.5"));
   SequenceOptions options;

@@ -1,0 +1,54 @@
+#include "rotodom/sequence/image_list.h"
+#include "rotodom/sequence/image_times.h"
+#include "rotodom/sequence/sequence_form.h"
+
+namespace rotslam::forms {
+namespace {
+
+namespace fs = std::filesystem;
+
+// The path is the folder of the sequence, or its `images`.
+fs::path TumMonoRoot(const fs::path& path) {
+  return path.filename() == "images" ? path.parent_path() : path;
+}
+
+Layout ListTumMono(const fs::path& path, const SequenceOptions& options) {
+  const fs::path root = TumMonoRoot(path);
+  Layout layout;
+  layout.folder = root / "images";
+  if (!IsFolder(layout.folder)) {
+    const std::string packed = (root / "images.zip").string();
+    Fail(packed, "is packed; unpack it: unzip " + packed + " -d " + layout.folder.string());
+  }
+  std::vector<fs::path> files = ImagesIn(layout.folder);
+  if (files.empty()) Fail(layout.folder, "holds no images");
+  AddImages(std::move(files), {root}, options, layout);
+  layout.camera = FindCamera({root}, layout.notes);
+  layout.ground_truth_file = FindGroundTruth(root);
+  if (!layout.ground_truth_file) {
+    layout.ground_truth_file = FirstFile({root / "groundtruthSync.txt"});
+  }
+  for (const char* name : {"pcalib.txt", "vignette.png"}) {
+    if (!IsFile(root / name)) continue;
+    layout.notes.push_back(std::string(name) +
+                           " (photometric calibration) is not used: features do not need it");
+  }
+  return layout;
+}
+
+}  // namespace
+
+SequenceForm SequenceFormTumMono() {
+  SequenceForm form;
+  form.name = "DSO / TUM-mono";
+  form.description = "`images/`, `times.txt` (id, seconds, exposure) and `camera.txt`";
+  form.recognises = [](const fs::path& path) {
+    const fs::path root = TumMonoRoot(path);
+    return IsFile(root / "times.txt") && IsFile(root / "camera.txt") &&
+           (IsFolder(root / "images") || IsFile(root / "images.zip"));
+  };
+  form.list = ListTumMono;
+  return form;
+}
+
+}  // namespace rotslam::forms
