@@ -11,6 +11,8 @@ packages=(
   cmake g++ ninja-build pkg-config
   # rotodom
   libeigen3-dev libheif-dev libopencv-dev libyaml-cpp-dev
+  # ROS bags: their compressed chunks; SQLite is below
+  libbz2-dev liblz4-dev libzstd-dev
   # krot and ba
   coinor-libclp-dev libceres-dev libgoogle-glog-dev
   # output and apps

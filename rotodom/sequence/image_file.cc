@@ -279,18 +279,7 @@ DecodedImage ToEightBits(cv::Mat image) {
   return ToEightBits(std::move(image), scale);
 }
 
-DecodedImage DecodeImageFile(const std::filesystem::path& file) {
-  // A folder can be opened, too, and then says that it is of 2^63 bytes.
-  std::error_code error;
-  if (!std::filesystem::is_regular_file(file, error)) return Failed("file cannot be opened");
-  std::ifstream stream(file, std::ios::binary | std::ios::ate);
-  Bytes bytes;
-  if (const std::streamoff size = stream.tellg(); size > 0) {
-    bytes.resize(static_cast<std::size_t>(size));
-    stream.seekg(0);
-    stream.read(reinterpret_cast<char*>(bytes.data()), size);
-  }
-  if (!stream.is_open() || stream.bad()) return Failed("file cannot be opened");
+DecodedImage DecodeImageBytes(const Bytes& bytes) {
   if (bytes.empty()) return Failed("file is empty");
   if (!IsKnownFormat(bytes)) return Failed("not a PNG, JPEG, TIFF, BMP, PNM, WebP or HEIC file");
   if (IsHeif(bytes)) return DecodeHeif(bytes);
@@ -308,6 +297,21 @@ DecodedImage DecodeImageFile(const std::filesystem::path& file) {
   }
   if (image.empty()) return Failed("image cannot be decoded");
   return {std::move(image), {}};
+}
+
+DecodedImage DecodeImageFile(const std::filesystem::path& file) {
+  // A folder can be opened, too, and then says that it is of 2^63 bytes.
+  std::error_code error;
+  if (!std::filesystem::is_regular_file(file, error)) return Failed("file cannot be opened");
+  std::ifstream stream(file, std::ios::binary | std::ios::ate);
+  Bytes bytes;
+  if (const std::streamoff size = stream.tellg(); size > 0) {
+    bytes.resize(static_cast<std::size_t>(size));
+    stream.seekg(0);
+    stream.read(reinterpret_cast<char*>(bytes.data()), size);
+  }
+  if (!stream.is_open() || stream.bad()) return Failed("file cannot be opened");
+  return DecodeImageBytes(bytes);
 }
 
 DecodedImage ReadImageFile(const std::filesystem::path& file, const PixelScale& scale) {

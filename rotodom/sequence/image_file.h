@@ -37,6 +37,9 @@ std::optional<std::string> Describe(const PixelScale& scale, int depth);
 /// before memory is taken for them. Whatever the file holds, this does not throw.
 DecodedImage DecodeImageFile(const std::filesystem::path& file);
 
+/// The same for the bytes of such a file.
+DecodedImage DecodeImageBytes(const std::vector<unsigned char>& bytes);
+
 /// `image` with 8 bits and 1 or 3 channels (blue, green, red); transparency is dropped.
 DecodedImage ToEightBits(cv::Mat image, const PixelScale& scale);
 

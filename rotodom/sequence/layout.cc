@@ -4,6 +4,7 @@
 #include <string_view>
 #include <system_error>
 
+#include "rotodom/sequence/bag/bag_reader.h"
 #include "rotodom/sequence/image_list.h"
 #include "rotodom/sequence/sequence_form.h"
 #include "rotodom/sequence/times.h"
@@ -56,7 +57,7 @@ void NoteGaps(Layout& layout) {
 
 const SequenceForm& FindSequenceForm(const fs::path& given) {
   std::error_code error;
-  if (!fs::exists(given, error)) Fail(given, "no such file or folder");
+  if (!fs::exists(ParseBagReference(given).file, error)) Fail(given, "no such file or folder");
   const fs::path path = CleanPath(given);
   const SequenceForm* best = nullptr;
   for (const SequenceForm& form : SequenceForms()) {

@@ -6,6 +6,7 @@
 #include <system_error>
 #include <utility>
 
+#include "rotodom/sequence/bag/bag_reader.h"
 #include "rotodom/sequence/bag/decompress.h"
 
 namespace rotslam {
@@ -21,7 +22,7 @@ BagFile::BagFile(fs::path path) : path_(std::move(path)) {
 }
 
 void BagFile::Fail(const std::string& reason) const {
-  throw std::runtime_error(path_.string() + ": " + reason);
+  throw std::runtime_error(path_.string() + ": " + PrintableText(reason));
 }
 
 std::string_view BagFile::Peek(std::uint64_t offset, std::size_t size) {
@@ -50,9 +51,8 @@ std::string BagFile::Read(std::uint64_t offset, std::uint64_t size) {
 
 std::string_view BagFile::Decompressed(const BagChunk& chunk) {
   constexpr std::size_t kMostKept = 2;
-  const auto known = std::find_if(kept_.begin(), kept_.end(), [&](const Kept& kept) {
-    return kept.offset == chunk.offset;
-  });
+  const auto known = std::find_if(
+      kept_.begin(), kept_.end(), [&](const Kept& kept) { return kept.offset == chunk.offset; });
   if (known != kept_.end()) {
     kept_.splice(kept_.begin(), kept_, known);
     return kept_.front().bytes;

@@ -8,10 +8,19 @@
 
 namespace rotslam {
 
+std::string PrintableText(std::string text) {
+  for (char& letter : text) {
+    if (static_cast<unsigned char>(letter) < ' ' || letter == '\x7f') letter = '?';
+  }
+  return text;
+}
+
 std::size_t BagReader::AddTopic(BagTopic topic) {
+  topic.name = PrintableText(std::move(topic.name));
+  topic.type = PrintableText(std::move(topic.type));
+  topic.encoding = PrintableText(std::move(topic.encoding));
   const auto same = [&](const BagTopic& other) {
-    return other.name == topic.name && other.type == topic.type &&
-           other.encoding == topic.encoding;
+    return other.name == topic.name && other.type == topic.type && other.encoding == topic.encoding;
   };
   const auto known = std::find_if(topics_.begin(), topics_.end(), same);
   if (known != topics_.end()) return static_cast<std::size_t>(known - topics_.begin());
@@ -26,7 +35,8 @@ void BagReader::AddMessage(const BagEntry& entry, std::string_view head) {
   BagEntry kept = entry;
   std::string unpacked;
   if (topics_[entry.topic].encoding == "cdr" && IsZstdFrame(head)) {
-    if (!CanDecompress("zstd")) unpacked = Decompressed(entry, BagEntry::kHeadSize);  // says why not
+    if (!CanDecompress("zstd"))
+      unpacked = Decompressed(entry, BagEntry::kHeadSize);  // says why not
     try {
       unpacked = Decompressed(entry, BagEntry::kHeadSize);
     } catch (const std::runtime_error&) {
@@ -85,7 +95,7 @@ std::string BagReader::Decompressed(const BagEntry& entry, std::uint64_t most_by
 }
 
 void BagReader::Fail(const std::string& reason) const {
-  throw std::runtime_error(path_.string() + ": " + reason);
+  throw std::runtime_error(path_.string() + ": " + PrintableText(reason));
 }
 
 }  // namespace rotslam

@@ -15,9 +15,9 @@ namespace rotslam {
 
 /// One topic of a bag.
 struct BagTopic {
-  std::string name;        // "/cam0/image_raw"
-  std::string type;        // "sensor_msgs/Image", in ROS 2 too (without its "/msg")
-  std::string encoding;    // how messages are serialised: "ros1", "cdr", or another word of the bag's
+  std::string name;      // "/cam0/image_raw"
+  std::string type;      // "sensor_msgs/Image", in ROS 2 too (without its "/msg")
+  std::string encoding;  // how messages are serialised: "ros1", "cdr", or another word of the bag's
   std::int64_t count = 0;  // messages in the bag
 };
 
@@ -117,6 +117,10 @@ struct BagReference {
   std::string topic;  // empty: none was named
 };
 BagReference ParseBagReference(const std::filesystem::path& path);
+
+/// `text` with `?` in place of line breaks and other control characters, which only damage brings
+/// into names.
+std::string PrintableText(std::string text);
 
 /// Readers of one kind of file each, for OpenBag.
 std::unique_ptr<BagReader> OpenRos1Bag(const std::filesystem::path& file, const BagFilter& wanted);

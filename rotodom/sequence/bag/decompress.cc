@@ -19,8 +19,8 @@ namespace {
 
 constexpr std::uint64_t kMostRawBytes = std::uint64_t{1} << 31;
 
-// Room for what comes out: doubled whenever it is full, up to `limit` and one byte, which shows that
-// there is more.
+// Room for what comes out: doubled whenever it is full, up to `limit` and one byte, which shows
+// that there is more.
 class GrowingOutput {
  public:
   explicit GrowingOutput(std::uint64_t limit) : limit_(limit + 1) { Grow(); }
@@ -55,7 +55,8 @@ class GrowingOutput {
   std::string bytes_;
 };
 
-[[noreturn, maybe_unused]] void FailWithout(const std::string& compression, const std::string& package) {
+[[noreturn, maybe_unused]] void FailWithout(const std::string& compression,
+                                            const std::string& package) {
   throw std::runtime_error("is compressed with " + compression +
                            ", and this program was built without it; install " + package +
                            " and build again");

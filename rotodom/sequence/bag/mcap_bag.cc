@@ -229,8 +229,7 @@ class McapBag : public BagReader {
 
 }  // namespace
 
-std::unique_ptr<BagReader> OpenMcapBag(const std::filesystem::path& file,
-                                       const BagFilter& wanted) {
+std::unique_ptr<BagReader> OpenMcapBag(const std::filesystem::path& file, const BagFilter& wanted) {
   return std::make_unique<McapBag>(file, wanted);
 }
 

@@ -10,6 +10,7 @@
 #include <utility>
 
 #include "rotodom/sequence/bag/bag_reader.h"
+#include "rotodom/sequence/image_list.h"
 #include "rotodom/sequence/layout.h"
 
 namespace rotslam {
@@ -158,7 +159,12 @@ std::unique_ptr<BagReader> OpenBag(const fs::path& path, const BagFilter& wanted
 bool IsBagName(const fs::path& path) {
   std::error_code error;
   if (!fs::is_directory(path, error)) return !BagKind(path).empty();
-  return !BagsIn(path).empty();
+  if (BagsIn(path).empty()) return false;
+  const fs::directory_iterator entries(path, error);
+  return fs::exists(path / "metadata.yaml", error) ||
+         std::none_of(begin(entries), end(entries), [](const fs::directory_entry& entry) {
+           return IsImageName(entry.path());
+         });
 }
 
 BagReference ParseBagReference(const fs::path& path) {

@@ -77,7 +77,7 @@ bool ParseRos1Fields(std::string_view bytes, Ros1Header* header) {
 
 // Records one after another: those of the file, or of a chunk in memory.
 struct Ros1Records {
-  BagFile* file = nullptr;   // of these two the one that is not empty
+  BagFile* file = nullptr;  // of these two the one that is not empty
   std::string_view memory;
   std::size_t chunk = 0;     // for BagEntry
   std::uint64_t offset = 0;  // of the next record
@@ -234,8 +234,7 @@ class Ros1Bag : public BagReader {
 
 }  // namespace
 
-std::unique_ptr<BagReader> OpenRos1Bag(const std::filesystem::path& file,
-                                       const BagFilter& wanted) {
+std::unique_ptr<BagReader> OpenRos1Bag(const std::filesystem::path& file, const BagFilter& wanted) {
   return std::make_unique<Ros1Bag>(file, wanted);
 }
 

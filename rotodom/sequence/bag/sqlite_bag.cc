@@ -132,8 +132,9 @@ class SqliteBag : public BagReader {
       AddMessage(entry, head);
     }
     if (status != SQLITE_DONE) {
-      notes_.push_back(std::string("the messages behind a damaged place are left out; SQLite says: ") +
-                       sqlite3_errmsg(database_.get()));
+      notes_.push_back(
+          std::string("the messages behind a damaged place are left out; SQLite says: ") +
+          sqlite3_errmsg(database_.get()));
     }
     if (num_unreadable_ > 0) {
       notes_.push_back("messages that are left out: " + std::to_string(num_unreadable_) +
@@ -158,8 +159,8 @@ class SqliteBag : public BagReader {
     const auto there = static_cast<std::uint64_t>(sqlite3_blob_bytes(blob_.get()));
     if (size > there || there > size_) Fail("a message is longer than the file can hold");
     std::string bytes(static_cast<std::size_t>(size), '\0');
-    if (size > 0 && sqlite3_blob_read(blob_.get(), bytes.data(), static_cast<int>(size), 0) !=
-                        SQLITE_OK) {
+    if (size > 0 &&
+        sqlite3_blob_read(blob_.get(), bytes.data(), static_cast<int>(size), 0) != SQLITE_OK) {
       FailAsSqlite();
     }
     return bytes;
