@@ -16,8 +16,29 @@ namespace {
 constexpr double kResidualGoal = 1e-15;
 constexpr double kResidualLimit = 2e-13;
 constexpr int kMaxNewtonSteps = 30;
-// tan of the largest angle off the axis that Unproject answers for kRadtan: 89.994 deg.
+// tan of the largest angle off the axis that Unproject answers for models of the plane z = 1:
+// 89.994 deg.
 constexpr double kMaxRadius = 1e4;
+// A kFov lens with a smaller field of view is a pinhole, to the last bit.
+constexpr double kLeastFov = 1e-10;
+
+// Whether a polynomial with these Bernstein coefficients on an interval is positive on all of it:
+// it is where they are, else both halves are asked.
+template <std::size_t n>
+bool IsPositive(const std::array<double, n>& b, int depth = 0) {
+  if (!(b.front() > 0.0 && b.back() > 0.0)) return false;
+  bool all = true;
+  for (std::size_t k = 1; k + 1 < n; ++k) all = all && b[k] > 0.0;
+  if (all) return true;
+  if (depth == 30) return false;  // touches zero within rounding
+  std::array<double, n> left;
+  std::array<double, n> right = b;
+  for (std::size_t level = 0; level < n; ++level) {  // de Casteljau at one half
+    left[level] = right[0];
+    for (std::size_t k = 0; k + level + 1 < n; ++k) right[k] = 0.5 * (right[k] + right[k + 1]);
+  }
+  return IsPositive(left, depth + 1) && IsPositive(right, depth + 1);
+}
 
 // Odd distortion polynomial d(t) = t (1 + a0 t^2 + a1 t^4 + a2 t^6 + a3 t^8): the radius for
 // kRadtan, the angle off the axis for kEquidistant.
@@ -40,7 +61,7 @@ class OddPolynomial {
   double Slope(double t) const { return Factor(t * t) + 2.0 * t * t * FactorSlope(t * t); }
 
   // Whether d' > 0 on all of [0, t]: nothing up to t lies beyond the fold. d' is a quartic in
-  // s = t^2; it is positive where its Bernstein coefficients are, else both halves are asked.
+  // s = t^2.
   bool IncreasesUpTo(double t) const {
     if (a_ == std::array<double, 4>{}) return true;
     const double s = t * t;
@@ -50,50 +71,140 @@ class OddPolynomial {
     const double c4 = 9.0 * a_[3] * s * s * s * s;
     // Far from the fold its terms cannot come to -1 together.
     if (std::abs(c1) + std::abs(c2) + std::abs(c3) + std::abs(c4) < 0.5) return true;
-    return Positive({1.0,
-                     1.0 + c1 / 4.0,
-                     1.0 + c1 / 2.0 + c2 / 6.0,
-                     1.0 + 3.0 * c1 / 4.0 + c2 / 2.0 + c3 / 4.0,
-                     1.0 + c1 + c2 + c3 + c4},
-                    0);
-  }
-
-  // The t in [0, max] with d(t) == value on the branch that starts at zero, or, when the fold or
-  // `max` comes first, the place where the branch ends. Bisection to the last bit.
-  double SolveOnFirstBranch(double value, double max) const {
-    double low = 0.0;
-    double high = max;
-    for (int k = 0; k < 100; ++k) {
-      const double middle = 0.5 * (low + high);
-      (IncreasesUpTo(middle) && Value(middle) < value ? low : high) = middle;
-    }
-    return low;
+    return IsPositive(std::array{1.0,
+                                 1.0 + c1 / 4.0,
+                                 1.0 + c1 / 2.0 + c2 / 6.0,
+                                 1.0 + 3.0 * c1 / 4.0 + c2 / 2.0 + c3 / 4.0,
+                                 1.0 + c1 + c2 + c3 + c4});
   }
 
  private:
-  using Bernstein = std::array<double, 5>;
-
-  static bool Positive(const Bernstein& b, int depth) {
-    if (!(b.front() > 0.0 && b.back() > 0.0)) return false;
-    if (b[1] > 0.0 && b[2] > 0.0 && b[3] > 0.0) return true;
-    if (depth == 30) return false;  // touches zero within rounding
-    Bernstein left;
-    Bernstein right = b;
-    for (int level = 0; level < 5; ++level) {  // de Casteljau at one half
-      left[level] = right[0];
-      for (int k = 0; k + level < 4; ++k) right[k] = 0.5 * (right[k] + right[k + 1]);
-    }
-    return Positive(left, depth + 1) && Positive(right, depth + 1);
-  }
-
   std::array<double, 4> a_ = {};
 };
 
+// d(r) = r N(s) / D(s) with s = r^2, N = 1 + k1 s + k2 s^2 + k3 s^3 and D = 1 + k4 s + k5 s^2 +
+// k6 s^3.
+class RationalRadial {
+ public:
+  explicit RationalRadial(const Camera& camera) {
+    const auto& k = camera.distortion;
+    numerator_ = {1.0, k[0], k[1], k[4]};
+    denominator_ = {1.0, k[5], k[6], k[7]};
+  }
+
+  // d(r) / r as a function of s = r^2, and its derivative by s.
+  double Factor(double s) const { return Value(numerator_, s) / Value(denominator_, s); }
+  double FactorSlope(double s) const {
+    const double d = Value(denominator_, s);
+    return (Slope(numerator_, s) * d - Value(numerator_, s) * Slope(denominator_, s)) / (d * d);
+  }
+  double Value(double r) const { return r * Factor(r * r); }
+
+  // Whether D > 0 and d' > 0 on all of [0, r]: nothing up to r lies beyond the fold or a pole. Then
+  // N > 0, too, since d' is not positive where N first comes down to zero.
+  bool IncreasesUpTo(double r) const {
+    // d' = Q / D^2 with Q = N D + 2 s (N' D - N D').
+    std::array<double, 7> Q = {};
+    for (std::size_t i = 0; i < 4; ++i) {
+      for (std::size_t j = 0; j < 4; ++j) {
+        const double share = 1.0 + 2.0 * (static_cast<double>(i) - static_cast<double>(j));
+        Q[i + j] += share * numerator_[i] * denominator_[j];
+      }
+    }
+    return IsPositiveUpTo(denominator_, r * r) && IsPositiveUpTo(Q, r * r);
+  }
+
+ private:
+  using Cubic = std::array<double, 4>;
+
+  static double Value(const Cubic& p, double s) {
+    return p[0] + s * (p[1] + s * (p[2] + s * p[3]));
+  }
+  static double Slope(const Cubic& p, double s) { return p[1] + s * (2.0 * p[2] + s * 3.0 * p[3]); }
+
+  // A polynomial whose coefficients start with 1, on [0, s].
+  template <std::size_t n>
+  static bool IsPositiveUpTo(std::array<double, n> p, double s) {
+    double power = 1.0;
+    double least = 1.0;
+    for (std::size_t m = 1; m < n; ++m) {
+      power *= s;
+      p[m] *= power;
+      if (!(p[m] >= 0.0)) least += p[m];
+    }
+    if (least > 0.0) return true;  // even with the negative terms at their end, all others at zero
+    // Bernstein coefficient j is the sum of p[m] binomial(j, m) / binomial(n - 1, m) over m <= j.
+    std::array<double, n> b;
+    for (std::size_t j = 0; j < n; ++j) {
+      double share = 1.0;
+      b[j] = p[0];
+      for (std::size_t m = 1; m <= j; ++m) {
+        share *= static_cast<double>(j - m + 1) / static_cast<double>(n - m);
+        b[j] += share * p[m];
+      }
+    }
+    return IsPositive(b);
+  }
+
+  Cubic numerator_;
+  Cubic denominator_;
+};
+
+// d(r) = atan(a r) / w with a = 2 tan(w / 2): even in w, and r where w is zero.
+class FovRadial {
+ public:
+  explicit FovRadial(const Camera& camera)
+      : w_(std::abs(camera.distortion[0])), a_(2.0 * std::tan(0.5 * w_)) {}
+
+  // d(r) / r as a function of s = r^2, and its derivative by s.
+  double Factor(double s) const {
+    if (w_ < kLeastFov) return 1.0;
+    if (s < kLeastSquare) return a_ / w_;
+    const double r = std::sqrt(s);
+    return std::atan(a_ * r) / (w_ * r);
+  }
+  double FactorSlope(double s) const {
+    if (w_ < kLeastFov) return 0.0;
+    if (s < kLeastSquare) return -a_ * a_ * a_ / (3.0 * w_);
+    return (a_ / (w_ * (1.0 + a_ * a_ * s)) - Factor(s)) / (2.0 * s);
+  }
+  bool IncreasesUpTo(double r) const { return std::isfinite(r); }
+
+  // The r with d(r) == value; nullopt beyond kMaxRadius.
+  std::optional<double> Inverse(double value) const {
+    const double angle = w_ * value;
+    if (!(angle < 0.5 * std::numbers::pi)) return std::nullopt;
+    const double r = w_ < kLeastFov ? value : std::tan(angle) / a_;
+    if (!(r <= kMaxRadius)) return std::nullopt;
+    return r;
+  }
+
+ private:
+  static constexpr double kLeastSquare = 1e-24;
+
+  double w_;
+  double a_;
+};
+
+// The t in [0, max] with d(t) == value on the branch that starts at zero, or, when the fold or
+// `max` comes first, the place where the branch ends. Bisection to the last bit.
+template <class Radial>
+double SolveOnFirstBranch(const Radial& radial, double value, double max) {
+  double low = 0.0;
+  double high = max;
+  for (int k = 0; k < 100; ++k) {
+    const double middle = 0.5 * (low + high);
+    (radial.IncreasesUpTo(middle) && radial.Value(middle) < value ? low : high) = middle;
+  }
+  return low;
+}
+
 // Radial and tangential distortion of a point of the plane z = 1.
-Eigen::Vector2d DistortRadtan(const Camera& camera,
-                              const OddPolynomial& radial,
-                              const Eigen::Vector2d& point,
-                              Eigen::Matrix2d& J) {
+template <class Radial>
+Eigen::Vector2d DistortOnPlane(const Camera& camera,
+                               const Radial& radial,
+                               const Eigen::Vector2d& point,
+                               Eigen::Matrix2d& J) {
   const double x = point.x();
   const double y = point.y();
   const double p1 = camera.distortion[2];
@@ -109,14 +220,15 @@ Eigen::Vector2d DistortRadtan(const Camera& camera,
           y * factor + p1 * (s + 2.0 * y * y) + 2.0 * p2 * x * y};
 }
 
-// Solves DistortRadtan(p) == target from `start`; every step is halved until it helps.
-std::optional<Eigen::Vector2d> NewtonRadtan(const Camera& camera,
-                                            const OddPolynomial& radial,
-                                            const Eigen::Vector2d& target,
-                                            Eigen::Vector2d point) {
+// Solves DistortOnPlane(p) == target from `start`; every step is halved until it helps.
+template <class Radial>
+std::optional<Eigen::Vector2d> NewtonOnPlane(const Camera& camera,
+                                             const Radial& radial,
+                                             const Eigen::Vector2d& target,
+                                             Eigen::Vector2d point) {
   const double unit = 1.0 + target.norm();
   Eigen::Matrix2d J;
-  Eigen::Vector2d residual = target - DistortRadtan(camera, radial, point, J);
+  Eigen::Vector2d residual = target - DistortOnPlane(camera, radial, point, J);
   for (int k = 0; k < kMaxNewtonSteps && residual.norm() > kResidualGoal * unit; ++k) {
     const double det = J.determinant();
     if (!(det > 0.0)) return std::nullopt;
@@ -125,7 +237,7 @@ std::optional<Eigen::Vector2d> NewtonRadtan(const Camera& camera,
     for (int halving = 0; halving < 12 && !better; ++halving, step *= 0.5) {
       Eigen::Matrix2d J_next;
       const Eigen::Vector2d next = point + step;
-      const Eigen::Vector2d r_next = target - DistortRadtan(camera, radial, next, J_next);
+      const Eigen::Vector2d r_next = target - DistortOnPlane(camera, radial, next, J_next);
       better = r_next.norm() < residual.norm();
       if (!better) continue;
       point = next;
@@ -141,14 +253,15 @@ std::optional<Eigen::Vector2d> NewtonRadtan(const Camera& camera,
   return point;
 }
 
-std::optional<Eigen::Vector2d> UndistortRadtan(const Camera& camera,
-                                               const Eigen::Vector2d& distorted) {
-  const OddPolynomial radial(camera);
-  if (auto point = NewtonRadtan(camera, radial, distorted, distorted)) return point;
+template <class Radial>
+std::optional<Eigen::Vector2d> UndistortOnPlane(const Camera& camera,
+                                                const Radial& radial,
+                                                const Eigen::Vector2d& distorted) {
+  if (auto point = NewtonOnPlane(camera, radial, distorted, distorted)) return point;
   // Near the fold, or across a second branch: start from the radial part alone, solved exactly.
   const double radius = distorted.norm();
-  const double start = radial.SolveOnFirstBranch(radius, kMaxRadius);
-  return NewtonRadtan(camera, radial, distorted, distorted * (start / radius));
+  const double start = SolveOnFirstBranch(radial, radius, kMaxRadius);
+  return NewtonOnPlane(camera, radial, distorted, distorted * (start / radius));
 }
 
 // The angle off the axis, at most pi, whose distorted value is `distorted`.
@@ -170,19 +283,20 @@ std::optional<double> UndistortAngle(const OddPolynomial& polynomial, double dis
     return theta;
   };
   if (const auto theta = solve_from(std::min(distorted, 0.5 * std::numbers::pi))) return theta;
-  return solve_from(polynomial.SolveOnFirstBranch(distorted, std::numbers::pi));
+  return solve_from(SolveOnFirstBranch(polynomial, distorted, std::numbers::pi));
 }
 
-std::optional<Eigen::Vector2d> ProjectRadtan(const Camera& camera,
-                                             const Eigen::Vector3d& point_in_cam,
-                                             Eigen::Matrix<double, 2, 3>* J) {
+template <class Radial>
+std::optional<Eigen::Vector2d> ProjectOnPlane(const Camera& camera,
+                                              const Eigen::Vector3d& point_in_cam,
+                                              Eigen::Matrix<double, 2, 3>* J) {
   if (!(point_in_cam.z() > 0.0)) return std::nullopt;
-  const OddPolynomial radial(camera);
+  const Radial radial(camera);
   const double inverse_depth = 1.0 / point_in_cam.z();
   const Eigen::Vector2d plane = point_in_cam.head<2>() * inverse_depth;
   if (!radial.IncreasesUpTo(plane.norm())) return std::nullopt;
   Eigen::Matrix2d J_distort;
-  const Eigen::Vector2d distorted = DistortRadtan(camera, radial, plane, J_distort);
+  const Eigen::Vector2d distorted = DistortOnPlane(camera, radial, plane, J_distort);
   if (!distorted.allFinite() || !(J_distort.determinant() > 0.0)) return std::nullopt;
   if (J != nullptr) {
     J->leftCols<2>() = J_distort * inverse_depth;
@@ -225,6 +339,47 @@ std::optional<Eigen::Vector2d> ProjectEquidistant(const Camera& camera,
     J->row(1) *= camera.fy;
   }
   return scale * xy;
+}
+
+// Before focal lengths and principal point; J is of the pixel.
+std::optional<Eigen::Vector2d> ProjectNormalised(const Camera& camera,
+                                                 const Eigen::Vector3d& point_in_cam,
+                                                 Eigen::Matrix<double, 2, 3>* J) {
+  switch (camera.model) {
+    case CameraModel::kPinhole:  // kRadtan with an empty polynomial
+    case CameraModel::kRadtan:
+      return ProjectOnPlane<OddPolynomial>(camera, point_in_cam, J);
+    case CameraModel::kEquidistant:
+      return ProjectEquidistant(camera, point_in_cam, J);
+    case CameraModel::kRational:
+      return ProjectOnPlane<RationalRadial>(camera, point_in_cam, J);
+    case CameraModel::kFov:
+      return ProjectOnPlane<FovRadial>(camera, point_in_cam, J);
+  }
+  return std::nullopt;
+}
+
+// Where the ray of a distorted point meets the plane z = 1; not for kEquidistant.
+std::optional<Eigen::Vector2d> UndistortToPlane(const Camera& camera,
+                                                const Eigen::Vector2d& distorted) {
+  switch (camera.model) {
+    case CameraModel::kPinhole:
+      return distorted;
+    case CameraModel::kRadtan:
+      return UndistortOnPlane(camera, OddPolynomial(camera), distorted);
+    case CameraModel::kRational:
+      return UndistortOnPlane(camera, RationalRadial(camera), distorted);
+    case CameraModel::kFov: {
+      const double radius = distorted.norm();
+      if (radius == 0.0) return distorted;
+      const auto r = FovRadial(camera).Inverse(radius);
+      if (!r) return std::nullopt;
+      return Eigen::Vector2d(distorted * (*r / radius));
+    }
+    case CameraModel::kEquidistant:
+      break;
+  }
+  return std::nullopt;
 }
 
 }  // namespace
@@ -304,10 +459,7 @@ std::optional<ReadoutStart> FindReadoutStart(const std::string& name) {
 
 std::optional<Eigen::Vector2d> Camera::Project(const Eigen::Vector3d& point_in_cam,
                                                Eigen::Matrix<double, 2, 3>* J) const {
-  // kPinhole is kRadtan with an empty polynomial.
-  const auto normalised = model == CameraModel::kEquidistant
-                              ? ProjectEquidistant(*this, point_in_cam, J)
-                              : ProjectRadtan(*this, point_in_cam, J);
+  const auto normalised = ProjectNormalised(*this, point_in_cam, J);
   if (!normalised) return std::nullopt;
   return Eigen::Vector2d(fx * normalised->x() + cx, fy * normalised->y() + cy);
 }
@@ -323,8 +475,7 @@ std::optional<Eigen::Vector3d> Camera::Unproject(const Eigen::Vector2d& pixel) c
     const Eigen::Vector2d xy = distorted * (std::sin(*theta) / radius);
     return Eigen::Vector3d(xy.x(), xy.y(), std::cos(*theta)).normalized();
   }
-  if (model == CameraModel::kPinhole) return distorted.homogeneous().normalized();
-  const auto plane = UndistortRadtan(*this, distorted);
+  const auto plane = UndistortToPlane(*this, distorted);
   if (!plane) return std::nullopt;
   return plane->homogeneous().normalized();
 }
@@ -355,6 +506,11 @@ std::optional<std::string> Camera::Problem() const {
     if (!std::isfinite(distortion[k])) {
       return "distortion[" + std::to_string(k) + "] is not a finite number";
     }
+  }
+  if (model == CameraModel::kFov && !(std::abs(distortion[0]) < std::numbers::pi)) {
+    std::ostringstream text;
+    text << "w is " << distortion[0] << ", must be a field of view in radians, below pi";
+    return text.str();
   }
   if (!(readout_s >= 0.0 && readout_s < 1.0)) {
     std::ostringstream text;

@@ -58,7 +58,8 @@ struct Camera {
   bool knows_readout = false;  // as its calibration says; else it is to be found out
 
   /// Pixel that shows `point_in_cam`; nullopt where the model does not reach (behind the image
-  /// plane for kPinhole and kRadtan, beyond the fold of the distortion polynomial).
+  /// plane for all but kEquidistant, beyond the fold of the distortion, and beyond a zero of
+  /// kRational's denominator).
   /// @param J  when given, receives d(pixel) / d(point_in_cam); untouched when nullopt.
   std::optional<Eigen::Vector2d> Project(const Eigen::Vector3d& point_in_cam,
                                          Eigen::Matrix<double, 2, 3>* J = nullptr) const;

@@ -113,9 +113,10 @@ std::array<double, 8> ReadDistortion(const Section& section,
                                      const std::string& key,
                                      CameraModel model) {
   const std::vector<std::string> texts = section.List(key);
-  const bool right_count = model == CameraModel::kPinhole  ? texts.empty()
-                           : model == CameraModel::kRadtan ? texts.size() == 4 || texts.size() == 5
-                                                           : texts.size() == 4;
+  const auto names = DistortionNames(model);
+  // OpenCV takes a distortion without k3 as well.
+  const bool right_count = texts.size() == names.size() ||
+                           (model == CameraModel::kRadtan && texts.size() + 1 == names.size());
   std::array<double, 8> distortion = {};
   for (std::size_t k = 0; k < texts.size(); ++k) {
     const std::string name = section.FullKey(key) + "[" + std::to_string(k) + "]";
@@ -125,19 +126,29 @@ std::array<double, 8> ReadDistortion(const Section& section,
   // Zeros say nothing: pinhole files often carry four of them.
   const bool silent = model == CameraModel::kPinhole && distortion == std::array<double, 8>{};
   if (!right_count && !(silent && texts.size() <= distortion.size())) {
+    std::string expected = model == CameraModel::kRadtan ? "4 or " : "";
+    expected += names.empty() ? "none" : std::to_string(names.size()) + ":";
+    for (const char* name : names) {
+      const bool is_optional = model == CameraModel::kRadtan && name == names.back();
+      expected.append(is_optional ? " [" : " ").append(name).append(is_optional ? "]" : "");
+    }
     Fail(section.file(),
          section.FullKey(key) + " has " + std::to_string(texts.size()) + " values, " + Name(model) +
-             " takes " +
-             (model == CameraModel::kPinhole  ? "none"
-              : model == CameraModel::kRadtan ? "4 or 5: k1 k2 p1 p2 [k3]"
-                                              : "4: k1 k2 k3 k4"));
+             " takes " + expected);
   }
   return distortion;
 }
 
+// The simplest model that is the same: kRational without a denominator is kRadtan; kRadtan and kFov
+// without coefficients are kPinhole.
 CameraModel WithoutEmptyDistortion(const Camera& camera) {
-  const bool empty = camera.distortion == std::array<double, 8>{};
-  return camera.model == CameraModel::kRadtan && empty ? CameraModel::kPinhole : camera.model;
+  const auto& d = camera.distortion;
+  CameraModel model = camera.model;
+  if (model == CameraModel::kRational && d[5] == 0.0 && d[6] == 0.0 && d[7] == 0.0) {
+    model = CameraModel::kRadtan;
+  }
+  if (model == CameraModel::kEquidistant || d != std::array<double, 8>{}) return model;
+  return CameraModel::kPinhole;
 }
 
 Camera ReadOurs(const fs::path& file, const YAML::Node& root) {
@@ -161,17 +172,17 @@ Camera ReadOurs(const fs::path& file, const YAML::Node& root) {
     }
   }
   const Section section(file, root, "");
-  const std::string model = section.Text("model");
-  Camera camera;
-  if (model == Name(CameraModel::kPinhole)) {
-    camera.model = CameraModel::kPinhole;
-  } else if (model == Name(CameraModel::kRadtan)) {
-    camera.model = CameraModel::kRadtan;
-  } else if (model == Name(CameraModel::kEquidistant)) {
-    camera.model = CameraModel::kEquidistant;
-  } else {
-    Fail(file, "model is '" + model + "', must be pinhole, radtan or equidistant");
+  const std::string name_of_model = section.Text("model");
+  const auto model = FindCameraModel(name_of_model);
+  if (!model) {
+    std::string known;
+    for (const CameraModel each : AllCameraModels()) {
+      known.append(known.empty() ? "" : ", ").append(Name(each));
+    }
+    Fail(file, "model is '" + name_of_model + "', must be one of " + known);
   }
+  Camera camera;
+  camera.model = *model;
   camera.width = section.PixelsOrZero("width");
   camera.height = section.PixelsOrZero("height");
   camera.fx = section.Positive("fx");
@@ -311,8 +322,7 @@ Camera ReadKitti(const fs::path& file, const std::vector<std::string>& row) {
   return camera;
 }
 
-// What the parameters of a COLMAP model mean, in their order: f is fx and fy at once; 0 has to be
-// zero for us to be able to read it.
+// What the parameters of a COLMAP model mean, in their order: f is fx and fy at once.
 struct ColmapModel {
   const char* name;
   CameraModel model;
@@ -327,8 +337,9 @@ const std::vector<ColmapModel>& ColmapModels() {
       {"RADIAL", CameraModel::kRadtan, {"f", "cx", "cy", "k1", "k2"}},
       {"OPENCV", CameraModel::kRadtan, {"fx", "fy", "cx", "cy", "k1", "k2", "p1", "p2"}},
       {"FULL_OPENCV",
-       CameraModel::kRadtan,
-       {"fx", "fy", "cx", "cy", "k1", "k2", "p1", "p2", "k3", "0", "0", "0"}},
+       CameraModel::kRational,
+       {"fx", "fy", "cx", "cy", "k1", "k2", "p1", "p2", "k3", "k4", "k5", "k6"}},
+      {"FOV", CameraModel::kFov, {"fx", "fy", "cx", "cy", "w"}},
       {"SIMPLE_RADIAL_FISHEYE", CameraModel::kEquidistant, {"f", "cx", "cy", "k1"}},
       {"RADIAL_FISHEYE", CameraModel::kEquidistant, {"f", "cx", "cy", "k1", "k2"}},
       {"OPENCV_FISHEYE",
@@ -445,22 +456,16 @@ Camera ReadColmapCamera(const fs::path& file, const std::vector<std::string>& wo
   for (std::size_t k = 0; k < num_given; ++k) {
     const std::string& name = found->parameters[k];
     const std::string& text = words[4 + k];
-    std::string key = who + (name == "0" ? "k" + std::to_string(k - 5) : name);
+    const std::string key = who + name;
     const double value = FiniteNumber(file, key, text);
     if (name == "f") camera.fx = camera.fy = PositiveNumber(file, key, text);
     if (name == "fx") camera.fx = PositiveNumber(file, key, text);
     if (name == "fy") camera.fy = PositiveNumber(file, key, text);
     if (name == "cx") camera.cx = value - 0.5;
     if (name == "cy") camera.cy = value - 0.5;
-    if (name == "k1") camera.distortion[0] = value;
-    if (name == "k2") camera.distortion[1] = value;
-    if (name == "p1") camera.distortion[2] = value;
-    if (name == "p2") camera.distortion[3] = value;
-    if (name == "k3") camera.distortion[camera.model == CameraModel::kRadtan ? 4 : 2] = value;
-    if (name == "k4") camera.distortion[3] = value;
-    if (name == "0" && value != 0.0) {
-      key.append(" is ").append(text);
-      Fail(file, key.append(", but a denominator of the distortion is not supported"));
+    const auto coefficients = DistortionNames(camera.model);
+    for (std::size_t c = 0; c < coefficients.size(); ++c) {
+      if (name == coefficients[c]) camera.distortion[c] = value;
     }
   }
   camera.model = WithoutEmptyDistortion(camera);

@@ -15,15 +15,15 @@ namespace rotslam {
 ///   EuRoC         `sensor.yaml`; pinhole with radial-tangential, equidistant or none
 ///   KITTI         `calib.txt`: the row P0 (all cameras of a rectified sequence share it); no size
 ///   COLMAP        `cameras.txt`: SIMPLE_PINHOLE, PINHOLE, SIMPLE_RADIAL, RADIAL, OPENCV,
-///                 FULL_OPENCV with k4 = k5 = k6 = 0, SIMPLE_RADIAL_FISHEYE, RADIAL_FISHEYE,
-///                 OPENCV_FISHEYE; several lines must agree. COLMAP puts pixel centres at one half:
+///                 FULL_OPENCV, FOV, SIMPLE_RADIAL_FISHEYE, RADIAL_FISHEYE, OPENCV_FISHEYE;
+///                 several lines must agree. COLMAP puts pixel centres at one half:
 ///                 cx and cy lose 0.5.
 /// Of a chain of cameras, the first. Foreign radtan files whose coefficients are all zero give
 /// kPinhole. A folder stands for the first of `camera.yaml`, `calib.txt`, `sensor.yaml`,
 /// `mav0/cam0/sensor.yaml` and `cameras.txt` in it.
 ///
 /// Our own form:
-///   model: radtan                    # pinhole, radtan or equidistant
+///   model: radtan                    # pinhole, radtan, equidistant, rational or fov
 ///   width: 752                       # pixels; both 0 or left out: the images decide
 ///   height: 480
 ///   fx: 458.654                      # pixels; pixel centres at integer coordinates, as in OpenCV
@@ -35,8 +35,8 @@ namespace rotslam {
 ///   not
 ///                                    # known, and 0
 ///   readout_from: top                # its first row: top, bottom, left or right; left out: top
-/// `distortion` is k1 k2 p1 p2 [k3] for radtan, k1 k2 k3 k4 for equidistant, empty or left out for
-/// pinhole. Unknown keys are errors.
+/// `distortion` is k1 k2 p1 p2 [k3] for radtan, k1 k2 k3 k4 for equidistant, k1 k2 p1 p2 k3 k4 k5
+/// k6 for rational, w in radians for fov, empty or left out for pinhole. Unknown keys are errors.
 ///
 /// Throws std::runtime_error in one line that names file and key: no such file, kind or model not
 /// known, a number missing, malformed, not finite, or not positive where it has to be.

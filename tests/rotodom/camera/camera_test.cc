@@ -1,7 +1,10 @@
 #include "rotodom/camera/camera.h"
 
+#include <algorithm>
+#include <array>
 #include <cmath>
 #include <limits>
+#include <numbers>
 #include <string>
 #include <utility>
 #include <vector>
@@ -14,7 +17,8 @@
 namespace rotslam {
 namespace {
 
-Camera MakeCamera(CameraModel model, int width, int height, const std::array<double, 9>& numbers) {
+// @param numbers  fx fy cx cy, then the distortion.
+Camera MakeCamera(CameraModel model, int width, int height, const std::array<double, 12>& numbers) {
   Camera camera;
   camera.model = model;
   camera.width = width;
@@ -23,7 +27,7 @@ Camera MakeCamera(CameraModel model, int width, int height, const std::array<dou
   camera.fy = numbers[1];
   camera.cx = numbers[2];
   camera.cy = numbers[3];
-  for (int k = 0; k < 5; ++k) camera.distortion[k] = numbers[4 + k];
+  for (int k = 0; k < 8; ++k) camera.distortion[k] = numbers[4 + k];
   return camera;
 }
 
@@ -34,7 +38,8 @@ struct NamedCamera {
 
 void PrintTo(const NamedCamera& named, std::ostream* out) { *out << named.name; }
 
-// Published calibrations; kEquidistantWide sees 180 degrees.
+// Published calibrations of phones and webcams, and lenses made up to be hard: PlainFisheye sees
+// 180 degrees, FovWide 170 from corner to corner.
 const std::vector<NamedCamera>& Cameras() {
   static const std::vector<NamedCamera> kCameras = {
       {"Kitti",
@@ -79,7 +84,37 @@ const std::vector<NamedCamera>& Cameras() {
                    0.00020294,
                    0.0})},
       {"PlainFisheye",
-       MakeCamera(CameraModel::kEquidistant, 1000, 1000, {318.0, 318.0, 499.5, 499.5})}};
+       MakeCamera(CameraModel::kEquidistant, 1000, 1000, {318.0, 318.0, 499.5, 499.5})},
+      {"Rational",
+       MakeCamera(CameraModel::kRational,
+                  480,
+                  360,
+                  {380.0, 382.0, 250.0, 172.0, 3.1, 1.4, 0.0005, -0.0007, 0.06, 3.4, 2.2, 0.32})},
+      // Made up after what an Azure Kinect has: numerator and denominator nearly cancel.
+      {"RationalKinect",
+       MakeCamera(CameraModel::kRational,
+                  1280,
+                  720,
+                  {605.3,
+                   605.1,
+                   637.9,
+                   365.1,
+                   0.5211,
+                   -2.7194,
+                   0.00074,
+                   -0.00015,
+                   1.5703,
+                   0.3976,
+                   -2.5302,
+                   1.4916})},
+      {"RationalWithoutDenominator",
+       MakeCamera(CameraModel::kRational,
+                  752,
+                  480,
+                  {458.654, 457.296, 367.215, 248.375, -0.2834, 0.0739, 0.0002, 2e-5, 0.0})},
+      {"Fov", MakeCamera(CameraModel::kFov, 640, 480, {260.0, 261.0, 318.0, 243.0, 0.93})},
+      {"FovWide", MakeCamera(CameraModel::kFov, 1000, 1000, {700.0, 700.0, 499.5, 499.5, 1.5})},
+      {"FovOfAPinhole", MakeCamera(CameraModel::kFov, 640, 480, {500.0, 500.0, 320.0, 240.0})}};
   return kCameras;
 }
 
@@ -125,10 +160,17 @@ TEST_P(EveryCamera, JacobianEqualsCentralDifferences) {
   }
 }
 
+// OpenCV's distortion of a camera; kFov is a model that OpenCV does not have.
+std::vector<double> OpenCvDistortion(const Camera& camera) {
+  const std::size_t count = DistortionNames(camera.model).size();
+  return {camera.distortion.begin(), camera.distortion.begin() + std::max<std::size_t>(count, 4)};
+}
+
 TEST_P(EveryCamera, AgreesWithOpenCv) {
   const Camera& camera = GetParam().camera;
+  if (camera.model == CameraModel::kFov) GTEST_SKIP() << "OpenCV does not have this model";
   const cv::Matx33d K(camera.fx, 0, camera.cx, 0, camera.fy, camera.cy, 0, 0, 1);
-  const auto& k = camera.distortion;
+  const std::vector<double> coefficients = OpenCvDistortion(camera);
   std::vector<cv::Point2d> pixels;
   for (int row = 0; row <= 8; ++row) {
     for (int column = 0; column <= 8; ++column) {
@@ -138,10 +180,8 @@ TEST_P(EveryCamera, AgreesWithOpenCv) {
   }
   std::vector<cv::Point2d> planes;
   if (camera.model == CameraModel::kEquidistant) {
-    const cv::Vec4d coefficients(k[0], k[1], k[2], k[3]);
     cv::fisheye::undistortPoints(pixels, planes, K, coefficients);
   } else {
-    const cv::Vec<double, 5> coefficients(k[0], k[1], k[2], k[3], k[4]);
     const cv::TermCriteria until(cv::TermCriteria::COUNT | cv::TermCriteria::EPS, 500, 1e-13);
     cv::undistortPoints(pixels, planes, K, coefficients, cv::noArray(), cv::noArray(), until);
   }
@@ -153,11 +193,9 @@ TEST_P(EveryCamera, AgreesWithOpenCv) {
     const std::vector<cv::Point3d> points = {{bearing.x(), bearing.y(), bearing.z()}};
     std::vector<cv::Point2d> projected;
     if (camera.model == CameraModel::kEquidistant) {
-      const cv::Vec4d coefficients(k[0], k[1], k[2], k[3]);
       cv::fisheye::projectPoints(
           points, projected, cv::Vec3d::all(0), cv::Vec3d::all(0), K, coefficients);
     } else {
-      const cv::Vec<double, 5> coefficients(k[0], k[1], k[2], k[3], k[4]);
       cv::projectPoints(points, cv::Vec3d::all(0), cv::Vec3d::all(0), K, coefficients, projected);
     }
     EXPECT_LT(cv::norm(projected[0] - pixels[n]), 1e-8);
@@ -211,6 +249,125 @@ TEST(Camera, FindsAFoldThatHidesBetweenTwoIncreasingParts) {
   EXPECT_TRUE(camera.Project({std::sqrt(0.399), 0.0, 1.0}));
   EXPECT_FALSE(camera.Project({std::sqrt(0.401), 0.0, 1.0}));
   EXPECT_FALSE(camera.Project({std::sqrt(0.7), 0.0, 1.0}));
+}
+
+TEST(Camera, RationalProjectsAsOpenCvOverTheWholeImage) {
+  for (const NamedCamera& named : Cameras()) {
+    const Camera& camera = named.camera;
+    if (camera.model != CameraModel::kRational) continue;
+    const cv::Matx33d K(camera.fx, 0, camera.cx, 0, camera.fy, camera.cy, 0, 0, 1);
+    for (double y = 0.0; y < camera.height; y += 11.7) {
+      for (double x = 0.0; x < camera.width; x += 11.7) {
+        const Eigen::Vector3d p = 2.0 * camera.Unproject({x, y}).value();
+        const std::vector<cv::Point3d> points = {{p.x(), p.y(), p.z()}};
+        std::vector<cv::Point2d> theirs;
+        cv::projectPoints(
+            points, cv::Vec3d::all(0), cv::Vec3d::all(0), K, OpenCvDistortion(camera), theirs);
+        const Eigen::Vector2d ours = camera.Project(p).value();
+        EXPECT_LT(std::hypot(ours.x() - theirs[0].x, ours.y() - theirs[0].y), 1e-10) << named.name;
+      }
+    }
+  }
+}
+
+// The same from the definitions: d(r) on a fine grid, until it does not increase or D has a zero.
+double FoldBySearch(const Camera& camera) {
+  const auto& k = camera.distortion;
+  double before = 0.0;
+  for (double r = 1e-5; r < 10.0; r += 1e-5) {
+    const double s = r * r;
+    const double D = 1.0 + s * (k[5] + s * (k[6] + s * k[7]));
+    const double d = r * (1.0 + s * (k[0] + s * (k[1] + s * k[4]))) / D;
+    if (!(D > 0.0) || !(d > before)) return r;
+    before = d;
+  }
+  return 10.0;
+}
+
+TEST(Camera, RationalStopsAtTheFirstFoldOrPole) {
+  const std::vector<std::array<double, 6>> lenses = {
+      // k1 k2 k3 k4 k5 k6
+      {0.0, 0.0, 0.0, 1.0, 0.0, 0.0},     // r / (1 + s): turns back at 1
+      {0.0, 0.0, 0.0, -0.25, 0.0, 0.0},   // a pole at 2, up to which it increases
+      {-1.0, 0.0, 0.0, -1.0, 0.01, 0.0},  // nearly cancels
+      {-0.3, 0.0, 0.0, 0.0, 0.0, 0.0},    // kRadtan's own fold
+      {3.1, 1.4, 0.06, 3.4, 2.2, 0.32},   //
+      {0.5211, -2.7194, 1.5703, 0.3976, -2.5302, 1.4916},
+      {0.0, 0.0, 0.0, -1.9, 0.95, 0.0},  // rises steeply, then falls
+      {0.2, 0.1, 0.0, 0.0, 0.0, 0.3}};
+  for (const auto& [k1, k2, k3, k4, k5, k6] : lenses) {
+    const Camera camera =
+        MakeCamera(CameraModel::kRational,
+                   640,
+                   480,
+                   {300.0, 300.0, 320.0, 240.0, k1, k2, 0.0, 0.0, k3, k4, k5, k6});
+    const double fold = FoldBySearch(camera);
+    SCOPED_TRACE(Describe(camera) + ", fold at " + std::to_string(fold));
+    for (const double share : {0.1, 0.3, 0.6, 0.9, 0.99, 0.9999}) {
+      const Eigen::Vector3d point(0.6 * share * fold, -0.8 * share * fold, 1.0);
+      const auto pixel = camera.Project(point);
+      ASSERT_TRUE(pixel) << share;
+      // Next to a pole neighbouring doubles are pixels apart, millions of pixels from the image.
+      if (pixel->norm() > 1e5) continue;
+      const auto bearing = camera.Unproject(*pixel);
+      ASSERT_TRUE(bearing) << share;
+      // At the fold itself the pixel says little about the bearing, so pixels are compared.
+      const auto again = camera.Project(*bearing);
+      ASSERT_TRUE(again) << share;
+      EXPECT_LT((*again - *pixel).norm(), 1e-9 * (1.0 + pixel->norm() / 1e3)) << share;
+      EXPECT_LT(bearing->cross(point.normalized()).norm(), 1e-6) << share;
+    }
+    if (fold == 10.0) continue;
+    for (const double share : {1.0001, 1.01, 1.5, 3.0, 30.0}) {
+      EXPECT_FALSE(camera.Project({0.6 * share * fold, -0.8 * share * fold, 1.0})) << share;
+    }
+  }
+  // The largest distorted radius of r / (1 + s) is one half.
+  const Camera camera =
+      MakeCamera(CameraModel::kRational,
+                 640,
+                 480,
+                 {300.0, 300.0, 320.0, 240.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0});
+  EXPECT_TRUE(camera.Unproject({320.0 + 149.999, 240.0}));
+  EXPECT_FALSE(camera.Unproject({320.0 + 150.001, 240.0}));
+}
+
+TEST(Camera, FovIsAnArcTangentOfTheRadius) {
+  const double w = 0.93;
+  const Camera camera = MakeCamera(CameraModel::kFov, 640, 480, {260.0, 261.0, 318.0, 243.0, w});
+  for (const Eigen::Vector2d& plane :
+       {Eigen::Vector2d(0.3, -0.4), Eigen::Vector2d(30.0, 40.0), Eigen::Vector2d(1e-9, 0.0)}) {
+    const double r = plane.norm();
+    const double d = std::atan(2.0 * r * std::tan(0.5 * w)) / w;
+    const Eigen::Vector2d expected(318.0 + 260.0 * plane.x() * d / r,
+                                   243.0 + 261.0 * plane.y() * d / r);
+    EXPECT_LT((camera.Project(3.0 * plane.homogeneous()).value() - expected).norm(), 1e-11);
+  }
+  // Every point in front is seen, and nothing beyond pi / (2 w).
+  EXPECT_TRUE(camera.Project({1e6, 0.0, 1.0}));
+  EXPECT_FALSE(camera.Project({1.0, 0.0, 0.0}));
+  const double end = 0.5 * std::numbers::pi / w;
+  EXPECT_TRUE(camera.Unproject({318.0 + 260.0 * (end - 1e-3), 243.0}));
+  EXPECT_FALSE(camera.Unproject({318.0 + 260.0 * (end + 1e-3), 243.0}));
+}
+
+TEST(Camera, FovWithoutAFieldOfViewIsAPinhole) {
+  Camera fov = MakeCamera(CameraModel::kFov, 640, 480, {500.0, 501.0, 320.0, 240.0});
+  Camera pinhole = fov;
+  pinhole.model = CameraModel::kPinhole;
+  const Eigen::Vector3d point(0.7, -0.4, 1.3);
+  for (const double w : {0.0, 1e-300, 1e-11, 1e-9, 1e-6, -1e-6}) {
+    fov.distortion[0] = w;
+    Eigen::Matrix<double, 2, 3> J;
+    Eigen::Matrix<double, 2, 3> J_pinhole;
+    EXPECT_LT((fov.Project(point, &J).value() - pinhole.Project(point, &J_pinhole).value()).norm(),
+              1e-9);
+    EXPECT_LT((J - J_pinhole).norm(), 1e-9);
+    const Eigen::Vector2d pixel(-30.0, 700.0);
+    EXPECT_LT((fov.Unproject(pixel).value() - pinhole.Unproject(pixel).value()).norm(), 1e-11);
+  }
+  fov.distortion[0] = 3.2;
+  EXPECT_THAT(fov.Problem().value(), testing::StartsWith("w is 3.2, must be a field of view"));
 }
 
 TEST(Camera, ProblemNamesTheField) {

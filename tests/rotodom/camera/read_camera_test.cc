@@ -66,7 +66,12 @@ TEST_F(ReadCameraTest, OursGivesBackWhatWasWritten) {
        {Make(CameraModel::kPinhole, {0, 0}, {500.0 + third, 501.0, 320.1, -2.5}),
         Make(CameraModel::kRadtan, {640, 480}, {5e2, 1e-3, 0, 1}, {third, -0.1, 1e-17, 0, 2}),
         Make(CameraModel::kRadtan, {640, 480}, {5e2, 5e2, 0, 1}),
-        Make(CameraModel::kEquidistant, {64, 48}, {190, 191, 32, 24}, {0.1, third, -1e-9, 4})}) {
+        Make(CameraModel::kEquidistant, {64, 48}, {190, 191, 32, 24}, {0.1, third, -1e-9, 4}),
+        Make(CameraModel::kRational,
+             {640, 480},
+             {380, 382, 250, 172},
+             {3.1, 1.4, 5e-4, -7e-4, third, 3.4, 2.2, 0.32}),
+        Make(CameraModel::kFov, {640, 480}, {5e2, 5e2, 0, 1}, {2.0 * third})}) {
     WriteCameraYaml(folder_ / "camera.yaml", camera);
     EXPECT_EQ(ReadCamera(folder_ / "camera.yaml"), camera) << CameraYaml(camera);
     EXPECT_EQ(ReadCamera(folder_), camera);  // the folder stands for it
@@ -225,10 +230,15 @@ TEST_F(ReadCameraTest, Colmap) {
   EXPECT_EQ(
       Read(header + "1 FULL_OPENCV 640 480 500 501 320 240 0.1 0.2 0.3 0.4 0.5 0 0 0\n"),
       Make(CameraModel::kRadtan, {640, 480}, {500, 501, 319.5, 239.5}, {0.1, 0.2, 0.3, 0.4, 0.5}));
-  EXPECT_THAT(
-      Complaint(header + "1 FULL_OPENCV 640 480 500 501 320 240 0.1 0.2 0.3 0.4 0.5 0 0.6 0\n"),
-      HasSubstr("camera 1: k5 is 0.6"));
-  EXPECT_THAT(Complaint("1 FOV 640 480 500 501 320 240 0.1\n"), HasSubstr("model is 'FOV'"));
+  EXPECT_EQ(Read(header + "1 FULL_OPENCV 640 480 500 501 320 240 0.1 0.2 0.3 0.4 0.5 0 0.6 0\n"),
+            Make(CameraModel::kRational,
+                 {640, 480},
+                 {500, 501, 319.5, 239.5},
+                 {0.1, 0.2, 0.3, 0.4, 0.5, 0.0, 0.6, 0.0}));
+  EXPECT_EQ(Read(header + "1 FOV 640 480 500 501 320 240 0.9\n"),
+            Make(CameraModel::kFov, {640, 480}, {500, 501, 319.5, 239.5}, {0.9}));
+  EXPECT_THAT(Complaint("1 FOV 640 480 500 501 320 240 90\n"),
+              HasSubstr("w is 90, must be a field of view in radians"));
   EXPECT_THAT(Complaint("1 PINHOLE 640 480 500 320 240\n"), HasSubstr("3 parameters"));
   EXPECT_THAT(Complaint("1 PINHOLE 640 480 500 0 320 240\n"), HasSubstr("camera 1: fy is '0'"));
   EXPECT_EQ(Read("1 SIMPLE_PINHOLE 640 480 500 320 240\n2 PINHOLE 640 480 500 500 320 240\n").fx,
@@ -247,10 +257,18 @@ TEST_F(ReadCameraTest, ComplaintsNameFileAndKey) {
   EXPECT_THAT(Complaint("model: pinhole\nfx: [5]\n" + end), HasSubstr("fx must be a single"));
   EXPECT_THAT(Complaint("model: pinhole\nfx: 5 px\n" + end), HasSubstr("fx is '5 px'"));
   EXPECT_THAT(Complaint("fx: 5\n" + end), HasSubstr("model is missing"));
-  EXPECT_THAT(Complaint("model: fov\nfx: 5\n" + end), HasSubstr("model is 'fov'"));
+  EXPECT_THAT(Complaint("model: ucm\nfx: 5\n" + end),
+              HasSubstr("model is 'ucm', must be one of pinhole, radtan, equidistant, rational, "
+                        "fov"));
   EXPECT_THAT(Complaint("model: radtan\nfx: 5\n" + end), HasSubstr("distortion is missing"));
   EXPECT_THAT(Complaint("model: pinhole\nfx: 5\ndistortion: [1, 2, 3, 4]\n" + end),
               HasSubstr("distortion has 4 values, pinhole takes none"));
+  EXPECT_THAT(Complaint("model: rational\nfx: 5\ndistortion: [1, 2, 3, 4, 5]\n" + end),
+              HasSubstr("distortion has 5 values, rational takes 8: k1 k2 p1 p2 k3 k4 k5 k6"));
+  EXPECT_THAT(Complaint("model: radtan\nfx: 5\ndistortion: [1, 2]\n" + end),
+              HasSubstr("distortion has 2 values, radtan takes 4 or 5: k1 k2 p1 p2 [k3]"));
+  EXPECT_THAT(Complaint("model: fov\nfx: 5\ndistortion: [1, 2]\n" + end),
+              HasSubstr("distortion has 2 values, fov takes 1: w"));
   EXPECT_THAT(Complaint("model: equidistant\nfx: 5\ndistortion: [1, x, 3, 4]\n" + end),
               HasSubstr("distortion[1] is 'x'"));
   EXPECT_THAT(Complaint("model: pinhole\nfx: 5\nfocal: 5\n" + end),
