@@ -456,9 +456,14 @@ void AddBundles(const std::vector<BundleSummary>& bundles,
                             {"lens.gain", largest.lens_gain},
                             {"lens.refined", largest.lens_refined},
                             {"lens.fx", camera.fx},
-                            {"lens.fy", camera.fy},
-                            {"lens.k1", camera.distortion[0]},
-                            {"lens.k2", camera.distortion[1]}};
+                            {"lens.fy", camera.fy}};
+  const bool is_fov = camera.model == CameraModel::kFov;
+  if (is_fov) {
+    summary.ba->push_back({"lens.w", camera.distortion[0]});
+  } else {
+    summary.ba->push_back({"lens.k1", camera.distortion[0]});
+    summary.ba->push_back({"lens.k2", camera.distortion[1]});
+  }
   if (largest.lens_sigmas) {
     const LensSigmas& sigmas = *largest.lens_sigmas;
     summary.ba->insert(summary.ba->end(),
@@ -467,8 +472,8 @@ void AddBundles(const std::vector<BundleSummary>& bundles,
                         {"lens.sigma_focal_px", sigmas.focal_px},
                         {"lens.sigma_cx_px", sigmas.cx_px},
                         {"lens.sigma_cy_px", sigmas.cy_px},
-                        {"lens.sigma_k1", sigmas.k1},
-                        {"lens.sigma_k2", sigmas.k2}});
+                        {is_fov ? "lens.sigma_w" : "lens.sigma_k1", sigmas.k1}});
+    if (!is_fov) summary.ba->push_back({"lens.sigma_k2", sigmas.k2});
   }
   double bundle_seconds = 0.0;
   double solver_seconds = 0.0;

@@ -204,7 +204,7 @@ class Rounds {
     }
     if (lens.refine_distortion) {
       sigmas.k1 = sigma[4];
-      sigmas.k2 = sigma[5];
+      if (NumLensCoefficients(calibrated_.model) > 1) sigmas.k2 = sigma[5];
     }
     return sigmas;
   }

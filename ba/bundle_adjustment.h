@@ -39,7 +39,7 @@ struct LensSigmas {
   double focal_px = 0.0;
   double cx_px = 0.0;
   double cy_px = 0.0;
-  double k1 = 0.0;
+  double k1 = 0.0;  // of kFov, w
   double k2 = 0.0;
 };
 

@@ -50,7 +50,7 @@ struct BundleRound {
 /// lens' distortion bends every track alike, and a long drive turns that into a drift of scale that
 /// no number of observations averages out.
 struct LensOptions {
-  // The first two radial coefficients; a pinhole camera becomes a radtan one.
+  // The first two radial coefficients, or w of kFov; a pinhole camera becomes a radtan one.
   bool refine_distortion = true;
   // Off: along a path the focal length trades with positions, and on EuRoC, whose calibration is
   // good, it moves by 1.2 % to make up for wrong matches.

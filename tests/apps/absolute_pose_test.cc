@@ -26,9 +26,7 @@ SeenPoints MakeTurnedView(CameraModel model,
 class AbsolutePoseForEveryCamera : public ::testing::TestWithParam<CameraModel> {};
 INSTANTIATE_TEST_SUITE_P(Models,
                          AbsolutePoseForEveryCamera,
-                         ::testing::Values(CameraModel::kPinhole,
-                                           CameraModel::kRadtan,
-                                           CameraModel::kEquidistant));
+                         ::testing::ValuesIn(AllCameraModels()));
 
 TEST_P(AbsolutePoseForEveryCamera, CleanSightingsGiveTheTruth) {
   const SeenPoints view = MakeTurnedView(GetParam(), 100, 0.0, 0.0);

@@ -18,6 +18,10 @@ inline Camera BaCamera(CameraModel model = CameraModel::kPinhole) {
   camera.cy = 185.0;
   if (model == CameraModel::kRadtan) camera.distortion = {-0.12, 0.05, 1e-3, -5e-4, 0.01};
   if (model == CameraModel::kEquidistant) camera.distortion = {-0.02, 0.01, -0.004, 1e-3, 0.0};
+  if (model == CameraModel::kRational) {
+    camera.distortion = {0.4, 0.1, 1e-3, -5e-4, 0.02, 0.5, 0.15, 0.03};
+  }
+  if (model == CameraModel::kFov) camera.distortion = {0.8};
   return camera;
 }
 

@@ -415,6 +415,34 @@ TEST(RefineBundle, RefinesTheDistortionThatACalibrationHasLeft) {
             1e-12);
 }
 
+TEST(RefineBundle, RefinesTheFirstCoefficientOfEveryModel) {
+  for (const auto& [model, change] : {std::pair(CameraModel::kEquidistant, 0.05),
+                                      std::pair(CameraModel::kRational, 0.05),
+                                      std::pair(CameraModel::kFov, 0.04)}) {
+    Camera lens = BaCamera(model);
+    lens.distortion[0] += change;
+    BaScene scene =
+        MakeBaScene({.num_frames = 40, .num_points = 1500, .noise_px = 0.2, .camera = lens});
+    scene.camera = BaCamera(model);
+    BundleOptions options;
+    options.find_covariance = true;
+    options.lens.distortion_sigma = 0.05;
+    const BundleResult result = RefineBundle(PerturbedProblem(scene, 0.1, 0.5), options);
+    SCOPED_TRACE(Name(model));
+    ASSERT_TRUE(result.Usable());
+    ASSERT_TRUE(result.summary.lens_refined) << result.summary.lens_gain;
+    EXPECT_EQ(result.camera.model, model);
+    EXPECT_FALSE(result.camera.Problem());
+    EXPECT_NEAR(result.camera.distortion[0], lens.distortion[0], 0.2 * change);
+    ASSERT_TRUE(result.summary.lens_sigmas.has_value());
+    EXPECT_GT(result.summary.lens_sigmas->k1, 0.0);
+    EXPECT_EQ(result.summary.lens_sigmas->k2 > 0.0, model != CameraModel::kFov);
+    for (std::size_t k = model == CameraModel::kFov ? 1 : 2; k < lens.distortion.size(); ++k) {
+      EXPECT_EQ(result.camera.distortion[k], lens.distortion[k]) << k;
+    }
+  }
+}
+
 TEST(RefineBundle, RefinesAFocalLengthWhenAsked) {
   Camera lens = BaCamera();
   lens.fx *= 1.02;

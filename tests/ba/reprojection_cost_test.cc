@@ -14,9 +14,7 @@ namespace {
 class ReprojectionForEveryCamera : public ::testing::TestWithParam<CameraModel> {};
 INSTANTIATE_TEST_SUITE_P(Models,
                          ReprojectionForEveryCamera,
-                         ::testing::Values(CameraModel::kPinhole,
-                                           CameraModel::kRadtan,
-                                           CameraModel::kEquidistant));
+                         ::testing::ValuesIn(AllCameraModels()));
 
 TEST_P(ReprojectionForEveryCamera, JacobianOfReprojectEqualsCentralDifferences) {
   const Camera camera = BaCamera(GetParam());
@@ -175,8 +173,14 @@ struct AutomaticReprojection {
       const T bent = theta * (1.0 + t2 * (d[0] + t2 * (d[1] + t2 * (d[2] + t2 * d[3]))));
       x *= bent / r;
       y *= bent / r;
-    } else if (camera.model == CameraModel::kRadtan) {
-      const T radial = 1.0 + r2 * (d[0] + r2 * (d[1] + r2 * d[4]));
+    } else if (camera.model == CameraModel::kFov) {
+      const T r = sqrt(r2);
+      const T bent = atan(2.0 * std::tan(0.5 * d[0]) * r) / d[0];
+      x *= bent / r;
+      y *= bent / r;
+    } else if (camera.model != CameraModel::kPinhole) {
+      const T radial = (1.0 + r2 * (d[0] + r2 * (d[1] + r2 * d[4]))) /
+                       (1.0 + r2 * (d[5] + r2 * (d[6] + r2 * d[7])));
       const T x_bent = x * radial + 2.0 * d[2] * x * y + d[3] * (r2 + 2.0 * x * x);
       y = y * radial + d[2] * (r2 + 2.0 * y * y) + 2.0 * d[3] * x * y;
       x = x_bent;
@@ -222,6 +226,57 @@ TEST(LensPriorCost, IsZeroAtWhatIsExpectedAndItsJacobianEqualsCentralDifferences
   ASSERT_TRUE(cost.Evaluate(parameters, residuals, nullptr));
   for (const double residual : residuals) EXPECT_EQ(residual, 0.0);
   ExpectJacobiansAgree(cost, {{1.01, 1.0, 0.0, 0.1, -0.09, 0.0}});
+}
+
+TEST_P(ReprojectionForEveryCamera, LensJacobianEqualsCentralDifferences) {
+  const Camera calibrated = BaCamera(GetParam());
+  const Eigen::Vector3d points[] = {
+      {1.1, -0.7, 4.0}, {0.0, 0.0, 2.0}, {-3.0, 1.0, 4.0}, {1e-9, 1e-9, 1.0}};
+  for (const double first : {-0.1, 0.3, 0.8}) {
+    LensParameters lens;
+    lens << 1.02, 0.99, 0.01, -0.02, first, 0.03;
+    const Camera camera = WithLens(calibrated, lens);
+    for (const Eigen::Vector3d& point : points) {
+      const auto J = LensJacobian(camera, calibrated, point, camera.Project(point).value());
+      for (int k = 0; k < 6; ++k) {
+        const LensParameters step = 1e-6 * LensParameters::Unit(k);
+        const Eigen::Vector2d difference =
+            (WithLens(calibrated, lens + step).Project(point).value() -
+             WithLens(calibrated, lens - step).Project(point).value()) /
+            2e-6;
+        EXPECT_LT((J.col(k) - difference).norm(), 1e-6 * (1.0 + difference.norm()))
+            << "parameter " << k << " at " << point.transpose() << ", coefficient " << first;
+      }
+    }
+  }
+}
+
+TEST_P(ReprojectionForEveryCamera, WithLensUndoesLensOfAndHoldsWhatAModelDoesNotHave) {
+  const Camera camera = BaCamera(GetParam());
+  const LensParameters calibrated = LensOf(camera, camera);
+  EXPECT_EQ(WithLens(camera, calibrated), camera);
+  LensParameters lens;
+  lens << 1.01, 0.99, 0.003, -0.004, 0.7, 0.02;
+  const Camera moved = WithLens(camera, lens);
+  EXPECT_FALSE(moved.Problem());
+  if (NumLensCoefficients(GetParam()) == 1) lens[5] = 0.0;
+  EXPECT_LT((LensOf(moved, camera) - lens).norm(), 1e-14);
+  for (std::size_t k = NumLensCoefficients(GetParam()); k < camera.distortion.size(); ++k) {
+    EXPECT_EQ(moved.distortion[k], camera.distortion[k]) << "coefficient " << k;
+  }
+}
+
+TEST(LensJacobian, OfASmallFieldOfViewIsThatOfItsSeries) {
+  Camera camera = BaCamera(CameraModel::kFov);
+  const Eigen::Vector3d point(0.6, -0.8, 1.0);
+  // d(r) = r + w^2 (r / 12 - r^3 / 3) + O(w^4); r is 1 here.
+  for (const double w : {0.0, 1e-9, 5e-5, 6e-5, 9e-5, 1e-3}) {
+    camera.distortion[0] = w;
+    const Eigen::Matrix<double, 2, 6> J =
+        LensJacobian(camera, camera, point, camera.Project(point).value());
+    EXPECT_NEAR(J(0, 4), -0.5 * w * 0.6 * camera.fx, 1e-5 * w * camera.fx) << w;
+    EXPECT_NEAR(J(1, 4), 0.5 * w * 0.8 * camera.fy, 1e-5 * w * camera.fy) << w;
+  }
 }
 
 TEST(WithLens, UndoesLensOfAndTurnsAPinholeIntoRadtanOnlyWhereItBends) {

@@ -19,11 +19,7 @@ ResectionStart NearStart(const SeenPoints& view, double angle_deg, double offset
 }
 
 class ResectionForEveryCamera : public ::testing::TestWithParam<CameraModel> {};
-INSTANTIATE_TEST_SUITE_P(Models,
-                         ResectionForEveryCamera,
-                         ::testing::Values(CameraModel::kPinhole,
-                                           CameraModel::kRadtan,
-                                           CameraModel::kEquidistant));
+INSTANTIATE_TEST_SUITE_P(Models, ResectionForEveryCamera, ::testing::ValuesIn(AllCameraModels()));
 
 TEST_P(ResectionForEveryCamera, CleanSightingsGiveTheTruth) {
   const SeenPoints view = MakeView(GetParam(), 100, 0.0, 0.0);
