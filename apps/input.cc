@@ -4,6 +4,7 @@
 #include <stdexcept>
 
 #include "apps/focal_guess.h"
+#include "rotodom/camera/camera_form.h"
 #include "rotodom/camera/read_camera.h"
 #include "rotodom/loop/vocabulary_file.h"
 
@@ -26,11 +27,10 @@ void AddInputFlags(CLI::App& command, InputFlags& flags) {
                   flags.sequence,
                   "Image folder, KITTI odometry, TUM RGB-D or EuRoC sequence, or video file")
       ->required();
-  command.add_option(
-      "--camera",
-      flags.camera,
-      "Calibration: our YAML, ORB-SLAM, Kalibr, KITTI, EuRoC or COLMAP; not needed where "
-      "it lies with the images");
+  command.add_option("--camera",
+                     flags.camera,
+                     "Calibration, of several cameras FILE:NAME: " + CameraFormNames() +
+                         "; not needed where it lies with the images");
   command
       .add_flag("--focal-guess",
                 flags.focal_guess,
@@ -57,19 +57,23 @@ std::shared_ptr<const Vocabulary> OpenVocabulary(const InputFlags& flags) {
   return std::make_shared<const Vocabulary>(ReadVocabulary(flags.vocabulary));
 }
 
-namespace {
-
-// From --camera, else from what lies with the images, else as the form of the input says.
 void ReadCalibration(const InputFlags& flags, Input& input) {
+  const Sequence& sequence = *input.sequence;
+  const cv::Size size = sequence.image_size();
   Camera camera;
-  if (!flags.camera.empty()) {
-    input.camera_file = flags.camera;
-    camera = ReadCamera(input.camera_file);
-  } else if (const auto& reference = input.sequence->camera_reference()) {
-    input.camera_file = reference->file.string();
-    camera = ReadCamera(*reference, input.sequence->image_folder());
-  } else if (const auto& own_camera = input.sequence->own_camera()) {
-    input.camera_file = input.sequence->form();
+  if (!flags.camera.empty() || sequence.camera_reference()) {
+    const CameraReference reference =
+        flags.camera.empty() ? *sequence.camera_reference() : ParseCameraReference(flags.camera);
+    const CameraFile file = ReadCameraFile(reference.file);
+    const NamedCamera chosen = ChooseCamera(file, reference, sequence.image_folder());
+    camera = AtSize(chosen, size.width, size.height);
+    input.camera_file = reference.file.string();
+    input.camera_source = input.camera_file + (chosen.name.empty() ? "" : ":" + chosen.name) +
+                          ", " + file.form;
+    input.camera_notes = file.notes;
+  } else if (const auto& own_camera = sequence.own_camera()) {
+    input.camera_file = sequence.form();
+    input.camera_source = "as " + sequence.form() + " says";
     camera = *own_camera;
   } else {
     throw std::runtime_error(
@@ -79,13 +83,11 @@ void ReadCalibration(const InputFlags& flags, Input& input) {
         "--focal-guess");
   }
   try {
-    input.camera = MatchToImages(camera, input.sequence->image_size());
+    input.camera = MatchToImages(camera, size);
   } catch (const std::runtime_error& error) {
     throw std::runtime_error(input.camera_file + ": " + error.what());
   }
 }
-
-}  // namespace
 
 Input OpenInput(const InputFlags& flags,
                 const SequenceOptions& options,

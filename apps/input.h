@@ -47,7 +47,9 @@ struct Input {
   std::unique_ptr<Sequence> sequence;
   Camera camera;  // with the size of the images
   std::string camera_file;
-  std::optional<FocalGuess> guess;  // set: there is no camera_file
+  std::string camera_source;              // for people: the file, the camera in it, its form
+  std::vector<std::string> camera_notes;  // what its reader ignored or assumed
+  std::optional<FocalGuess> guess;        // set: there is no camera_file
   // How its sensor is read out, where the images tell it instead of the calibration.
   std::optional<ReadoutEstimate> readout;
   // Orientations from elsewhere, and their file.
@@ -58,6 +60,10 @@ struct Input {
 /// The vocabulary that --vocabulary names; null when it names none. Throws std::runtime_error with
 /// one clear line.
 std::shared_ptr<const Vocabulary> OpenVocabulary(const InputFlags& flags);
+
+/// Reads the camera of `input`'s sequence: from --camera, else from what lies with the images, else
+/// as the form of the input says. Throws std::runtime_error with one clear line.
+void ReadCalibration(const InputFlags& flags, Input& input);
 
 /// Opens the sequence, reads its camera (`flags.camera`, else what lies with the images; or guesses
 /// it where `flags.focal_guess`) and says what was understood through `tell`; reads

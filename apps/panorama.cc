@@ -161,10 +161,13 @@ int MakePanorama(const PanoramaFlags& flags) {
   const Frames frames = ChooseFrames(flags, static_cast<int>(poses.size()));
   const std::string place = SequencePath(flags, summary);
   const SequenceOptions sequence_options = SequenceOptionsOf(summary);
-  const cv::Size size = OpenSequence(place, sequence_options)->image_size();
+  const auto opened = OpenSequence(place, sequence_options);
+  const cv::Size size = opened->image_size();
   const Camera camera =
       MatchToImages(flags.camera.empty() ? CameraOf(summary, (run / "summary.json").string())
-                                         : ReadCamera(flags.camera),
+                                         : ReadCamera(ParseCameraReference(flags.camera),
+                                                      opened->image_folder(),
+                                                      {size.width, size.height}),
                     size);
 
   const std::vector<int> chosen = Thinned(poses, frames, camera);

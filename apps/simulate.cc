@@ -33,7 +33,7 @@ struct SimulateFlags {
 
 Camera CameraOf(const SimulateFlags& flags) {
   if (!flags.camera.empty()) {
-    Camera camera = ReadCamera(flags.camera);
+    Camera camera = ReadCamera(ParseCameraReference(flags.camera), {}, {flags.width, flags.height});
     if (camera.width == 0) {
       camera.width = flags.width;
       camera.height = flags.height;
@@ -128,7 +128,9 @@ void AddSimulateCommand(CLI::App& app, Action& action) {
   command->add_option(
       "--poses", simulation.poses, "street: KITTI pose file to drive along (12 numbers a line)");
   auto* camera = command->add_option(
-      "--camera", flags->camera, "Camera file (any kind `run` reads), with distortion");
+      "--camera",
+      flags->camera,
+      "Camera file (any form `run` reads; FILE:NAME of several), with distortion");
   command->add_option("--width", flags->width, "Image width in pixels")
       ->check(CLI::Range(16, 20000))
       ->capture_default_str();

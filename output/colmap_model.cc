@@ -15,7 +15,7 @@
 
 #include "output/binary_file.h"
 #include "output/unit_length.h"
-#include "rotodom/camera/read_camera.h"
+#include "rotodom/camera/colmap_camera.h"
 #include "rotodom/types/text_file.h"
 
 namespace rotslam {

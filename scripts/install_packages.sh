@@ -10,13 +10,13 @@ packages=(
   # tools
   cmake g++ ninja-build pkg-config
   # rotodom
-  libeigen3-dev libheif-dev libopencv-dev libyaml-cpp-dev
+  libeigen3-dev libheif-dev libopencv-dev libtinyxml2-dev libyaml-cpp-dev nlohmann-json3-dev
   # ROS bags: their compressed chunks; SQLite is below
   libbz2-dev liblz4-dev libzstd-dev
   # krot and ba
   coinor-libclp-dev libceres-dev libgoogle-glog-dev
   # output and apps
-  libcli11-dev libexif-dev libpcl-dev libspdlog-dev libsqlite3-dev nlohmann-json3-dev
+  libcli11-dev libexif-dev libpcl-dev libspdlog-dev libsqlite3-dev
   # Python module; numpy also for the independent check of `rotslam eval`
   pybind11-dev python3-dev python3-numpy
   # the report and the plots

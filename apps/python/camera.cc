@@ -64,11 +64,14 @@ Camera MakeCamera(double fx,
 
 Camera ReadCameraFor(const py::object& path,
                      const std::optional<int>& width,
-                     const std::optional<int>& height) {
-  const Camera camera = ReadCamera(PathOf(path));
+                     const std::optional<int>& height,
+                     const std::string& name) {
   if (width.has_value() != height.has_value()) {
     throw std::invalid_argument("width and height go together");
   }
+  CameraReference reference = ParseCameraReference(PathOf(path));
+  if (!name.empty()) reference.name = name;
+  const Camera camera = ReadCamera(reference, {}, {width.value_or(0), height.value_or(0)});
   return width ? MatchToImages(camera, cv::Size(*width, *height)) : camera;
 }
 
@@ -105,14 +108,15 @@ first row to the last; 0 for a global one. readout_from: where its first row is,
       .def_property_readonly("model", [](const Camera& camera) { return Name(camera.model); })
       .def("__repr__",
            [](const Camera& camera) { return "<rotslam.Camera " + Describe(camera) + ">"; });
-  module.def(
-      "read_camera",
-      &ReadCameraFor,
-      "path"_a,
-      "width"_a = py::none(),
-      "height"_a = py::none(),
-      R"(The camera of a calibration file: our YAML, ORB-SLAM, Kalibr, KITTI, EuRoC or COLMAP.
+  module.def("read_camera",
+             &ReadCameraFor,
+             "path"_a,
+             "width"_a = py::none(),
+             "height"_a = py::none(),
+             "camera"_a = "",
+             R"(The camera of a calibration file of any form that `rotslam run` reads.
 
+camera: name of one of several in the file, "cam1" or "P2"; also as "calib.yaml:cam1" in path.
 width, height: of the images, for files that do not say; a file that says otherwise is refused.
 Raises RuntimeError in one line that names file and key.)");
 }

@@ -59,8 +59,9 @@ class PySequence {
   std::optional<Camera> OwnCamera() const {
     const auto& reference = sequence_->camera_reference();
     if (!reference) return sequence_->own_camera();
-    return MatchToImages(ReadCamera(*reference, sequence_->image_folder()),
-                         sequence_->image_size());
+    const cv::Size size = sequence_->image_size();
+    return MatchToImages(
+        ReadCamera(*reference, sequence_->image_folder(), {size.width, size.height}), size);
   }
 
   std::optional<std::string> GroundTruth() const {

@@ -1,421 +1,182 @@
 #include "rotodom/camera/read_camera.h"
 
 #include <algorithm>
-#include <array>
 #include <charconv>
 #include <cmath>
 #include <cstddef>
 #include <fstream>
-#include <initializer_list>
 #include <iterator>
-#include <optional>
-#include <sstream>
 #include <stdexcept>
 #include <string>
 #include <system_error>
 #include <utility>
 #include <vector>
 
-#include <yaml-cpp/yaml.h>
+#include "rotodom/camera/camera_form.h"
+#include "rotodom/camera/section.h"
 
 namespace rotslam {
 namespace {
 
 namespace fs = std::filesystem;
 
-[[noreturn]] void Fail(const fs::path& file, const std::string& reason) {
-  std::string text = file.string() + ": " + reason;
-  std::replace(text.begin(), text.end(), '\n', ' ');  // which a word of a YAML file may hold
-  throw std::runtime_error(text);
-}
-
-std::string Lower(std::string text) {
-  for (char& c : text) {
-    if (c >= 'A' && c <= 'Z') c = static_cast<char>(c - 'A' + 'a');
-  }
-  return text;
-}
-
-double FiniteNumber(const fs::path& file, const std::string& key, const std::string& text) {
-  double value = 0.0;
-  const char* begin = text.data() + (text.size() > 1 && text.front() == '+' ? 1 : 0);
-  const char* end = text.data() + text.size();
-  const auto result = std::from_chars(begin, end, value);
-  if (text.empty() || result.ec != std::errc() || result.ptr != end || !std::isfinite(value)) {
-    Fail(file, key + " is '" + text + "', must be a finite number");
-  }
-  return value;
-}
-
-double PositiveNumber(const fs::path& file, const std::string& key, const std::string& text) {
-  const double value = FiniteNumber(file, key, text);
-  if (!(value > 0.0)) Fail(file, key + " is '" + text + "', must be positive");
-  return value;
-}
-
-int PixelCount(const fs::path& file, const std::string& key, const std::string& text) {
-  const double value = FiniteNumber(file, key, text);
-  if (value < 0.0 || value > 1e6 || value != std::floor(value)) {
-    Fail(file, key + " is '" + text + "', must be a whole number of pixels");
-  }
-  return static_cast<int>(value);
-}
-
-// A map of a YAML file, with the place it has there, so that what is wrong can be named.
-class Section {
- public:
-  Section(fs::path file, const YAML::Node& node, std::string prefix)
-      : file_(std::move(file)), node_(node), prefix_(std::move(prefix)) {}
-
-  const fs::path& file() const { return file_; }
-  std::string FullKey(const std::string& key) const { return prefix_ + key; }
-  bool Has(const std::string& key) const { return Find(key).IsDefined() && !Find(key).IsNull(); }
-
-  std::string Text(const std::string& key) const {
-    if (!Has(key)) Fail(file_, FullKey(key) + " is missing");
-    const YAML::Node value = Find(key);
-    if (!value.IsScalar()) Fail(file_, FullKey(key) + " must be a single value");
-    return value.Scalar();
-  }
-  double Finite(const std::string& key) const {
-    return FiniteNumber(file_, FullKey(key), Text(key));
-  }
-  double Positive(const std::string& key) const {
-    return PositiveNumber(file_, FullKey(key), Text(key));
-  }
-  double FiniteOrZero(const std::string& key) const { return Has(key) ? Finite(key) : 0.0; }
-  int PixelsOrZero(const std::string& key) const {
-    return Has(key) ? PixelCount(file_, FullKey(key), Text(key)) : 0;
-  }
-
-  // The values of a list, as text; empty when the key is missing or empty.
-  std::vector<std::string> List(const std::string& key) const {
-    std::vector<std::string> values;
-    if (!Has(key)) return values;
-    const YAML::Node list = Find(key);
-    if (!list.IsSequence()) Fail(file_, FullKey(key) + " must be a list: [..]");
-    for (const YAML::Node& value : list) {
-      if (!value.IsScalar()) Fail(file_, FullKey(key) + " must be a list of numbers");
-      values.push_back(value.Scalar());
-    }
-    return values;
-  }
-
- private:
-  YAML::Node Find(const std::string& key) const { return node_[key]; }
-
-  fs::path file_;
-  const YAML::Node node_;  // const: looking a key up must not create it
-  std::string prefix_;
-};
-
-std::array<double, 8> ReadDistortion(const Section& section,
-                                     const std::string& key,
-                                     CameraModel model) {
-  const std::vector<std::string> texts = section.List(key);
-  const auto names = DistortionNames(model);
-  // OpenCV takes a distortion without k3 as well.
-  const bool right_count = texts.size() == names.size() ||
-                           (model == CameraModel::kRadtan && texts.size() + 1 == names.size());
-  std::array<double, 8> distortion = {};
-  for (std::size_t k = 0; k < texts.size(); ++k) {
-    const std::string name = section.FullKey(key) + "[" + std::to_string(k) + "]";
-    const double value = FiniteNumber(section.file(), name, texts[k]);
-    if (k < distortion.size()) distortion[k] = value;
-  }
-  // Zeros say nothing: pinhole files often carry four of them.
-  const bool silent = model == CameraModel::kPinhole && distortion == std::array<double, 8>{};
-  if (!right_count && !(silent && texts.size() <= distortion.size())) {
-    std::string expected = model == CameraModel::kRadtan ? "4 or " : "";
-    expected += names.empty() ? "none" : std::to_string(names.size()) + ":";
-    for (const char* name : names) {
-      const bool is_optional = model == CameraModel::kRadtan && name == names.back();
-      expected.append(is_optional ? " [" : " ").append(name).append(is_optional ? "]" : "");
-    }
-    Fail(section.file(),
-         section.FullKey(key) + " has " + std::to_string(texts.size()) + " values, " + Name(model) +
-             " takes " + expected);
-  }
-  return distortion;
-}
-
-// The simplest model that is the same: kRational without a denominator is kRadtan; kRadtan and kFov
-// without coefficients are kPinhole.
-CameraModel WithoutEmptyDistortion(const Camera& camera) {
-  const auto& d = camera.distortion;
-  CameraModel model = camera.model;
-  if (model == CameraModel::kRational && d[5] == 0.0 && d[6] == 0.0 && d[7] == 0.0) {
-    model = CameraModel::kRadtan;
-  }
-  if (model == CameraModel::kEquidistant || d != std::array<double, 8>{}) return model;
-  return CameraModel::kPinhole;
-}
-
-Camera ReadOurs(const fs::path& file, const YAML::Node& root) {
-  static const std::vector<std::string> kKeys = {"model",
-                                                 "width",
-                                                 "height",
-                                                 "fx",
-                                                 "fy",
-                                                 "cx",
-                                                 "cy",
-                                                 "distortion",
-                                                 "readout_s",
-                                                 "readout_from"};
-  for (const auto& entry : root) {
-    const std::string key = entry.first.Scalar();
-    if (std::find(kKeys.begin(), kKeys.end(), key) == kKeys.end()) {
-      Fail(file,
-           "line " + std::to_string(entry.first.Mark().line + 1) + ": " + key +
-               " is no key of a camera file; known are model, width, height, fx, fy, cx, cy, "
-               "distortion, readout_s, readout_from");
-    }
-  }
-  const Section section(file, root, "");
-  const std::string name_of_model = section.Text("model");
-  const auto model = FindCameraModel(name_of_model);
-  if (!model) {
-    std::string known;
-    for (const CameraModel each : AllCameraModels()) {
-      known.append(known.empty() ? "" : ", ").append(Name(each));
-    }
-    Fail(file, "model is '" + name_of_model + "', must be one of " + known);
-  }
-  Camera camera;
-  camera.model = *model;
-  camera.width = section.PixelsOrZero("width");
-  camera.height = section.PixelsOrZero("height");
-  camera.fx = section.Positive("fx");
-  camera.fy = section.Positive("fy");
-  camera.cx = section.Finite("cx");
-  camera.cy = section.Finite("cy");
-  if (camera.model != CameraModel::kPinhole && !section.Has("distortion")) {
-    Fail(file, "distortion is missing");
-  }
-  camera.distortion = ReadDistortion(section, "distortion", camera.model);
-  camera.readout_s = section.FiniteOrZero("readout_s");
-  camera.knows_readout = section.Has("readout_s");
-  if (section.Has("readout_from")) {
-    const std::string name = section.Text("readout_from");
-    const auto start = FindReadoutStart(name);
-    if (!start) Fail(file, "readout_from is '" + name + "', must be top, bottom, left or right");
-    camera.readout_from = *start;
-  }
-  return camera;
-}
-
-// ORB-SLAM 1 and 2 write Camera.fx; ORB-SLAM 3 Camera1.fx, but Camera.type and Camera.width.
-Camera ReadOrbSlam(const fs::path& file, const YAML::Node& root) {
-  const Section section(file, root, "");
-  const std::string lens = section.Has("Camera1.fx") ? "Camera1." : "Camera.";
-  const std::string type = section.Has("Camera.type") ? section.Text("Camera.type") : "PinHole";
-  Camera camera;
-  if (Lower(type) == "pinhole") {
-    camera.model = CameraModel::kRadtan;
-  } else if (Lower(type) == "rectified") {
-    camera.model = CameraModel::kPinhole;
-  } else if (Lower(type) == "kannalabrandt8") {
-    camera.model = CameraModel::kEquidistant;
-  } else {
-    Fail(file, "Camera.type is '" + type + "', must be PinHole, Rectified or KannalaBrandt8");
-  }
-  camera.width = section.PixelsOrZero("Camera.width");
-  camera.height = section.PixelsOrZero("Camera.height");
-  camera.fx = section.Positive(lens + "fx");
-  camera.fy = section.Positive(lens + "fy");
-  camera.cx = section.Finite(lens + "cx");
-  camera.cy = section.Finite(lens + "cy");
-  const auto read = [&](std::initializer_list<const char*> names) {
-    std::size_t k = 0;
-    for (const char* name : names) camera.distortion[k++] = section.FiniteOrZero(lens + name);
-  };
-  if (camera.model == CameraModel::kRadtan) read({"k1", "k2", "p1", "p2", "k3"});
-  if (camera.model == CameraModel::kEquidistant) {
-    for (const char* name : {"k1", "k2", "k3", "k4"}) section.Finite(lens + name);
-    read({"k1", "k2", "k3", "k4"});
-  }
-  camera.model = WithoutEmptyDistortion(camera);
-  return camera;
-}
-
-// One camera of a Kalibr chain, or an EuRoC sensor: the same keys but for one.
-Camera ReadKalibrOrEuroc(const Section& section) {
-  Camera camera;
-  const std::string projection = section.Text("camera_model");
-  if (projection != "pinhole") {
-    Fail(section.file(),
-         section.FullKey("camera_model") + " is '" + projection + "', must be pinhole");
-  }
-  const std::string model =
-      section.Has("distortion_model") ? section.Text("distortion_model") : "none";
-  if (model == "radtan" || model == "radial-tangential") {
-    camera.model = CameraModel::kRadtan;
-  } else if (model == "equidistant") {
-    camera.model = CameraModel::kEquidistant;
-  } else if (model == "none") {
-    camera.model = CameraModel::kPinhole;
-  } else {
-    Fail(section.file(),
-         section.FullKey("distortion_model") + " is '" + model +
-             "', must be radtan, radial-tangential, equidistant or none");
-  }
-  const std::vector<std::string> intrinsics = section.List("intrinsics");
-  if (intrinsics.size() != 4) {
-    Fail(section.file(),
-         section.FullKey("intrinsics") + " has " + std::to_string(intrinsics.size()) +
-             " values, must have 4: fx fy cx cy");
-  }
-  const auto name = [&](const char* key, int k) {
-    return section.FullKey(key) + "[" + std::to_string(k) + "]";
-  };
-  camera.fx = PositiveNumber(section.file(), name("intrinsics", 0), intrinsics[0]);
-  camera.fy = PositiveNumber(section.file(), name("intrinsics", 1), intrinsics[1]);
-  camera.cx = FiniteNumber(section.file(), name("intrinsics", 2), intrinsics[2]);
-  camera.cy = FiniteNumber(section.file(), name("intrinsics", 3), intrinsics[3]);
-  const std::vector<std::string> resolution = section.List("resolution");
-  if (!resolution.empty() && resolution.size() != 2) {
-    Fail(section.file(), section.FullKey("resolution") + " must have 2 values: width height");
-  }
-  if (!resolution.empty()) {
-    camera.width = PixelCount(section.file(), name("resolution", 0), resolution[0]);
-    camera.height = PixelCount(section.file(), name("resolution", 1), resolution[1]);
-  }
-  const char* key =
-      section.Has("distortion_coeffs") ? "distortion_coeffs" : "distortion_coefficients";
-  camera.distortion = ReadDistortion(section, key, camera.model);
-  camera.model = WithoutEmptyDistortion(camera);
-  return camera;
-}
-
-std::vector<std::string> Words(const std::string& line) {
-  std::istringstream stream(line);
-  return {std::istream_iterator<std::string>(stream), {}};
-}
-
-// Lines that are neither blank nor comments, as words.
-std::vector<std::vector<std::string>> WordLines(const std::string& text) {
-  std::vector<std::vector<std::string>> lines;
-  std::istringstream stream(text);
-  for (std::string line; std::getline(stream, line);) {
-    std::vector<std::string> words = Words(line);
-    if (!words.empty() && words.front().front() != '#') lines.push_back(std::move(words));
-  }
-  return lines;
-}
-
-Camera ReadKitti(const fs::path& file, const std::vector<std::string>& row) {
-  if (row.size() != 13) {
-    Fail(file, "P0 has " + std::to_string(row.size() - 1) + " values, must have 12");
-  }
-  std::array<double, 12> P = {};
-  for (std::size_t k = 0; k < P.size(); ++k) {
-    P[k] = FiniteNumber(file, "P0[" + std::to_string(k) + "]", row[k + 1]);
-  }
-  if (P[1] != 0.0 || P[4] != 0.0 || P[8] != 0.0 || P[9] != 0.0 || P[10] != 1.0) {
-    Fail(file, "P0 is not of the form fx 0 cx . 0 fy cy . 0 0 1 .");
-  }
-  Camera camera;
-  camera.fx = PositiveNumber(file, "P0[0], the focal length,", row[1]);
-  camera.fy = PositiveNumber(file, "P0[5], the focal length,", row[6]);
-  camera.cx = P[2];
-  camera.cy = P[6];
-  return camera;
-}
-
-// What the parameters of a COLMAP model mean, in their order: f is fx and fy at once.
-struct ColmapModel {
-  const char* name;
-  CameraModel model;
-  std::vector<std::string> parameters;
-};
-
-const std::vector<ColmapModel>& ColmapModels() {
-  static const std::vector<ColmapModel> kModels = {
-      {"SIMPLE_PINHOLE", CameraModel::kPinhole, {"f", "cx", "cy"}},
-      {"PINHOLE", CameraModel::kPinhole, {"fx", "fy", "cx", "cy"}},
-      {"SIMPLE_RADIAL", CameraModel::kRadtan, {"f", "cx", "cy", "k1"}},
-      {"RADIAL", CameraModel::kRadtan, {"f", "cx", "cy", "k1", "k2"}},
-      {"OPENCV", CameraModel::kRadtan, {"fx", "fy", "cx", "cy", "k1", "k2", "p1", "p2"}},
-      {"FULL_OPENCV",
-       CameraModel::kRational,
-       {"fx", "fy", "cx", "cy", "k1", "k2", "p1", "p2", "k3", "k4", "k5", "k6"}},
-      {"FOV", CameraModel::kFov, {"fx", "fy", "cx", "cy", "w"}},
-      {"SIMPLE_RADIAL_FISHEYE", CameraModel::kEquidistant, {"f", "cx", "cy", "k1"}},
-      {"RADIAL_FISHEYE", CameraModel::kEquidistant, {"f", "cx", "cy", "k1", "k2"}},
-      {"OPENCV_FISHEYE",
-       CameraModel::kEquidistant,
-       {"fx", "fy", "cx", "cy", "k1", "k2", "k3", "k4"}}};
-  return kModels;
-}
-
-Camera ReadColmap(const fs::path& file, const std::vector<std::vector<std::string>>& lines) {
-  const Camera camera = ReadColmapCamera(file, lines.front());
-  for (const std::vector<std::string>& words : lines) {
-    if (words.size() < 4 || ReadColmapCamera(file, words) != camera) {
-      Fail(file,
-           "cameras " + lines.front().front() + " and " + words.front() +
-               " differ; keep the line of the one to use");
-    }
-  }
-  return camera;
-}
-
-bool IsColmapLine(const std::vector<std::string>& words) {
-  const auto all = [](const std::string& text, const char* characters) {
-    return text.find_first_not_of(characters) == std::string::npos;
-  };
-  return words.size() >= 4 && all(words[0], "0123456789") &&
-         all(words[1], "ABCDEFGHIJKLMNOPQRSTUVWXYZ_0123456789") && all(words[2], "0123456789");
-}
-
-// OpenCV's first line, "%YAML:1.0", is a directive without a meaning to yaml-cpp, which skips it.
-Camera ReadYaml(const fs::path& file, const std::string& text) {
-  YAML::Node root;
-  try {
-    root = YAML::Load(text);
-  } catch (const YAML::Exception& error) {
-    Fail(file, "line " + std::to_string(error.mark.line + 1) + " is not YAML: " + error.msg);
-  }
-  if (root.IsMap()) {
-    const Section section(file, root, "");
-    for (const auto& entry : root) {
-      const std::string key = entry.first.Scalar();
-      if (key.rfind("Camera.", 0) == 0 || key.rfind("Camera1.", 0) == 0) {
-        return ReadOrbSlam(file, root);
-      }
-    }
-    if (section.Has("cam0")) {
-      if (!root["cam0"].IsMap()) Fail(file, "cam0 must be a map");
-      return ReadKalibrOrEuroc(Section(file, root["cam0"], "cam0."));
-    }
-    if (section.Has("camera_model") || section.Has("intrinsics")) return ReadKalibrOrEuroc(section);
-    if (section.Has("model") || section.Has("fx")) return ReadOurs(file, root);
-  }
-  Fail(file,
-       "no camera found; known are our own YAML (model, fx, ...), ORB-SLAM YAML, Kalibr chain, "
-       "EuRoC sensor.yaml, KITTI calib.txt and COLMAP cameras.txt");
-}
-
-Camera ReadText(const fs::path& file, const std::string& text) {
-  if (text.find('\0') != std::string::npos) Fail(file, "is not a text file");
-  const auto lines = WordLines(text);
-  if (lines.empty()) Fail(file, "is empty");
-  for (const std::vector<std::string>& words : lines) {
-    if (words.front() == "P0:") return ReadKitti(file, words);
-  }
-  if (IsColmapLine(lines.front())) return ReadColmap(file, lines);
-  return ReadYaml(file, text);
-}
-
 fs::path FileToRead(const fs::path& path) {
   std::error_code ignored;
-  if (!fs::exists(path, ignored)) Fail(path, "no such camera file");
+  if (!fs::exists(path, ignored)) FailAt(path, 0, "no such camera file");
   if (!fs::is_directory(path, ignored)) return path;
-  for (const char* name :
-       {"camera.yaml", "calib.txt", "sensor.yaml", "mav0/cam0/sensor.yaml", "cameras.txt"}) {
-    if (fs::is_regular_file(path / name, ignored)) return path / name;
+  if (fs::is_regular_file(path / "camera.yaml", ignored)) return path / "camera.yaml";
+  std::vector<std::string> found;  // one for each form
+  for (const CameraForm& form : CameraForms()) {
+    for (const std::string& name : form.file_names) {
+      if (!fs::is_regular_file(path / name, ignored)) continue;
+      found.push_back(name);
+      break;
+    }
   }
-  Fail(path, "is a folder without a camera file; give the file");
+  if (found.empty()) FailAt(path, 0, "is a folder without a camera file; give the file");
+  if (found.size() > 1) {
+    FailAt(path, 0, "has the camera files " + found[0] + " and " + found[1] + "; give one of them");
+  }
+  return path / found[0];
+}
+
+[[noreturn]] void FailUnknown(const CameraDocument& document) {
+  if (!document.binary().empty()) {
+    FailAt(document.file(), 0, "is not a text file, and no cameras.bin of COLMAP");
+  }
+  if (document.rows().empty()) FailAt(document.file(), 0, "is empty");
+  if (!document.parse_problem().empty()) throw std::runtime_error(document.parse_problem());
+  FailAt(document.file(), 0, "no camera found; known are " + CameraFormNames());
+}
+
+const CameraForm& FormOf(const CameraDocument& document) {
+  const CameraForm* found = nullptr;
+  for (const CameraForm& form : CameraForms()) {
+    if (!form.recognises(document)) continue;
+    if (found != nullptr) {
+      FailAt(document.file(),
+             0,
+             "has the keys of two forms, " + found->name + " and " + form.name +
+                 "; remove those that are not meant");
+    }
+    found = &form;
+  }
+  if (found == nullptr) FailUnknown(document);
+  return *found;
+}
+
+std::string NamesOf(const CameraFile& file) {
+  constexpr std::size_t kMost = 8;
+  std::string names;
+  for (std::size_t k = 0; k < file.cameras.size() && k < kMost; ++k) {
+    names += (k == 0 ? "" : ", ") + file.cameras[k].name;
+  }
+  return file.cameras.size() > kMost ? names + ", ..." : names;
+}
+
+bool SameNumbers(const NamedCamera& a, const NamedCamera& b) {
+  return a.problem.empty() && b.problem.empty() && a.camera == b.camera &&
+         a.view_angle_x_rad == b.view_angle_x_rad;
+}
+
+// The number at the end of `word` behind one of the beginnings; -1: there is none.
+int NumberBehind(const std::string& word, std::initializer_list<const char*> beginnings) {
+  for (const std::string beginning : beginnings) {
+    if (!word.starts_with(beginning)) continue;
+    const char* begin = word.data() + beginning.size();
+    const char* end = word.data() + word.size();
+    int number = 0;
+    const auto result = std::from_chars(begin, end, number);
+    if (begin != end && result.ec == std::errc() && result.ptr == end && number >= 0 &&
+        number < 100) {
+      return number;
+    }
+  }
+  return -1;
+}
+
+// Names, in lower case, that the forms give to the camera of a stereo pair, or of a chain.
+std::vector<std::string> NamesOfNumber(int number) {
+  const std::string index = std::to_string(number);
+  const std::string ordinal = std::to_string(number + 1);
+  std::vector<std::string> names = {"cam" + index,
+                                    "camera" + ordinal,
+                                    "m" + ordinal,
+                                    "k" + ordinal,
+                                    "cameramatrix" + ordinal,
+                                    "camera_matrix_" + ordinal};
+  if (number == 0) names.insert(names.end(), {"left", "camera_matrix_left", "camera"});
+  if (number == 1) names.insert(names.end(), {"right", "camera_matrix_right"});
+  return names;
+}
+
+// Names, in lower case, of the cameras that a component of the images' path stands for.
+std::vector<std::string> NamesFor(const std::string& component, bool is_unrectified) {
+  const std::string word = Lower(component);
+  const int camera = NumberBehind(word, {"cam", "cam_", "camera", "camera_"});
+  if (camera >= 0) return NamesOfNumber(camera);
+  if (const int image = NumberBehind(word, {"image_"}); image >= 0) {
+    const std::string number = (image < 10 ? "0" : "") + std::to_string(image);
+    return {"p" + std::to_string(image), (is_unrectified ? "k_" : "p_rect_") + number};
+  }
+  if (word == "left" || word == "image_left" || word == "left_image") return NamesOfNumber(0);
+  if (word == "right" || word == "image_right" || word == "right_image") return NamesOfNumber(1);
+  if (word.starts_with("image_rect") || word == "rectified") return {"rectified"};
+  return {};
+}
+
+const NamedCamera* FindByNames(const CameraFile& file, const std::vector<std::string>& names) {
+  for (const std::string& name : names) {
+    for (const NamedCamera& camera : file.cameras) {
+      if (Lower(camera.name) == name) return &camera;
+    }
+  }
+  return nullptr;
+}
+
+const NamedCamera* FindByName(const CameraFile& file, const std::string& name) {
+  for (const NamedCamera& camera : file.cameras) {
+    if (camera.name == name) return &camera;
+  }
+  if (const NamedCamera* found = FindByNames(file, {Lower(name)})) return found;
+  return FindByNames(file, NamesFor(name, false));
+}
+
+const NamedCamera* FindByFolder(const CameraFile& file, const fs::path& image_folder) {
+  constexpr int kMostComponents = 4;  // above, folders say where images lie
+  const bool is_unrectified = image_folder.string().find("_extract") != std::string::npos;
+  fs::path folder = image_folder;
+  for (int k = 0; k < kMostComponents && !folder.empty(); ++k, folder = folder.parent_path()) {
+    const auto names = NamesFor(folder.filename().string(), is_unrectified);
+    if (const NamedCamera* found = FindByNames(file, names)) return found;
+    if (folder == folder.parent_path()) break;
+  }
+  return nullptr;
+}
+
+const NamedCamera& Choose(const CameraFile& file,
+                          const CameraReference& reference,
+                          const fs::path& image_folder) {
+  if (!reference.name.empty()) {
+    const NamedCamera* found = FindByName(file, reference.name);
+    if (found != nullptr) return *found;
+    const std::string names = NamesOf(file);
+    FailAt(reference.file,
+           0,
+           "has no camera '" + reference.name + "'" +
+               (names.empty() ? ", only one without a name" : "; it has " + names));
+  }
+  if (file.cameras.size() == 1) return file.cameras.front();
+  if (const NamedCamera* found = FindByFolder(file, image_folder)) return *found;
+  if (file.first_is_default) return file.cameras.front();
+  for (const NamedCamera& camera : file.cameras) {
+    if (SameNumbers(camera, file.cameras.front())) continue;
+    FailAt(reference.file,
+           0,
+           "has cameras that differ: " + NamesOf(file) + "; say which with --camera " +
+               reference.file.filename().string() + ":" + file.cameras.front().name);
+  }
+  return file.cameras.front();
 }
 
 std::string NumberText(double value) {
@@ -426,61 +187,88 @@ std::string NumberText(double value) {
 
 }  // namespace
 
-Camera ReadCamera(const CameraReference& reference, const std::filesystem::path&) {
-  return ReadCamera(reference.file);
+std::string CameraFormNames() {
+  std::string names;
+  for (const CameraForm& form : CameraForms()) names += (names.empty() ? "" : ", ") + form.name;
+  return names;
 }
 
-Camera ReadColmapCamera(const fs::path& file, const std::vector<std::string>& words) {
-  const std::string who = "camera " + words[0] + ": ";
-  const auto& models = ColmapModels();
-  const auto found = std::find_if(models.begin(), models.end(), [&](const ColmapModel& model) {
-    return words[1] == model.name;
-  });
-  if (found == models.end()) {
-    std::string known;
-    for (const ColmapModel& model : models) {
-      known.append(known.empty() ? "" : ", ").append(model.name);
-    }
-    Fail(file, who + "model is '" + words[1] + "', must be one of " + known);
+void CameraFile::Add(const std::string& name, const std::function<Camera()>& read) {
+  NamedCamera camera;
+  camera.name = name;
+  try {
+    camera.camera = read();
+  } catch (const std::runtime_error& error) {
+    camera.problem = error.what();
   }
-  const std::size_t num_given = words.size() - std::min<std::size_t>(words.size(), 4);
-  if (num_given != found->parameters.size()) {
-    Fail(file,
-         who + found->name + " has " + std::to_string(num_given) + " parameters, must have " +
-             std::to_string(found->parameters.size()));
-  }
-  Camera camera;
-  camera.model = found->model;
-  camera.width = PixelCount(file, who + "width", words[2]);
-  camera.height = PixelCount(file, who + "height", words[3]);
-  for (std::size_t k = 0; k < num_given; ++k) {
-    const std::string& name = found->parameters[k];
-    const std::string& text = words[4 + k];
-    const std::string key = who + name;
-    const double value = FiniteNumber(file, key, text);
-    if (name == "f") camera.fx = camera.fy = PositiveNumber(file, key, text);
-    if (name == "fx") camera.fx = PositiveNumber(file, key, text);
-    if (name == "fy") camera.fy = PositiveNumber(file, key, text);
-    if (name == "cx") camera.cx = value - 0.5;
-    if (name == "cy") camera.cy = value - 0.5;
-    const auto coefficients = DistortionNames(camera.model);
-    for (std::size_t c = 0; c < coefficients.size(); ++c) {
-      if (name == coefficients[c]) camera.distortion[c] = value;
-    }
-  }
-  camera.model = WithoutEmptyDistortion(camera);
+  cameras.push_back(std::move(camera));
+}
+
+Camera AtSize(const NamedCamera& named, int width, int height) {
+  Camera camera = named.camera;
+  if (!named.view_angle_x_rad) return camera;
+  camera.width = width;
+  camera.height = height;
+  camera.fx = camera.fy = 0.5 * width / std::tan(0.5 * *named.view_angle_x_rad);
+  camera.cx = 0.5 * (width - 1);
+  camera.cy = 0.5 * (height - 1);
   return camera;
 }
 
-Camera ReadCamera(const fs::path& path) {
-  const fs::path file = FileToRead(path);
-  std::ifstream stream(file, std::ios::binary);
-  const std::string text{std::istreambuf_iterator<char>(stream), {}};
-  if (!stream.is_open() || stream.bad()) Fail(file, "cannot be read");
-  const Camera camera = ReadText(file, text);
-  if (const auto problem = camera.Problem()) Fail(file, *problem);
+CameraFile ReadCameraFile(const fs::path& path) {
+  const CameraDocument document(FileToRead(path));
+  const CameraForm& form = FormOf(document);
+  CameraFile file = form.read(document);
+  file.form = form.name;
+  if (file.cameras.empty()) FailAt(document.file(), 0, "no camera found in this " + form.name);
+  for (NamedCamera& camera : file.cameras) {
+    if (!camera.problem.empty()) continue;
+    const auto problem = AtSize(camera, 2, 2).Problem();
+    if (!problem) continue;
+    camera.problem = document.file().string() + ": " +
+                     (camera.name.empty() ? "" : camera.name + ": ") + *problem;
+  }
+  const auto is_good = [](const NamedCamera& camera) { return camera.problem.empty(); };
+  if (std::none_of(file.cameras.begin(), file.cameras.end(), is_good)) {
+    throw std::runtime_error(file.cameras.front().problem);
+  }
+  return file;
+}
+
+CameraReference ParseCameraReference(const std::string& text) {
+  std::error_code ignored;
+  const std::size_t colon = text.rfind(':');
+  if (colon == std::string::npos || fs::exists(text, ignored)) return {text, ""};
+  const bool is_name =
+      colon > 1 && colon + 1 < text.size();  // colon 1: the drive of a Windows path
+  const bool has_folders = text.find_first_of("/\\", colon) != std::string::npos;
+  const bool is_file = is_name && fs::exists(text.substr(0, colon), ignored);
+  if (!is_name || (has_folders && !is_file)) return {text, ""};
+  return {text.substr(0, colon), text.substr(colon + 1)};
+}
+
+NamedCamera ChooseCamera(const CameraFile& file,
+                         const CameraReference& reference,
+                         const fs::path& image_folder) {
+  const NamedCamera& camera = Choose(file, reference, image_folder);
+  if (!camera.problem.empty()) throw std::runtime_error(camera.problem);
   return camera;
 }
+
+Camera ReadCamera(const CameraReference& reference,
+                  const fs::path& image_folder,
+                  const std::array<int, 2>& image_size) {
+  const NamedCamera camera = ChooseCamera(ReadCameraFile(reference.file), reference, image_folder);
+  if (camera.view_angle_x_rad && image_size[0] <= 0) {
+    FailAt(reference.file,
+           0,
+           "gives an angle of view in place of a focal length, and not the size of the images (w "
+           "and h) that it needs with it");
+  }
+  return AtSize(camera, image_size[0], image_size[1]);
+}
+
+Camera ReadCamera(const fs::path& file) { return ReadCamera(CameraReference{file, ""}); }
 
 std::string CameraYaml(const Camera& camera) {
   std::string text = "model: " + std::string(Name(camera.model)) + "\n";
@@ -515,7 +303,7 @@ void WriteCameraYaml(const fs::path& file, const Camera& camera) {
   if (!stream || error) {
     std::error_code ignored;
     fs::remove(beside, ignored);
-    Fail(file, "cannot be written");
+    FailAt(file, 0, "cannot be written");
   }
 }
 

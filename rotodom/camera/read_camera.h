@@ -1,26 +1,20 @@
 #pragma once
 
+#include <array>
 #include <filesystem>
 #include <string>
-#include <vector>
 
 #include "rotodom/camera/camera.h"
+#include "rotodom/camera/camera_file.h"
 
 namespace rotslam {
 
-/// Reads one camera from a calibration file, whose kind is recognised by its content:
-///   ours          YAML, see below
-///   ORB-SLAM      YAML with `Camera.fx` or `Camera1.fx`; types PinHole, Rectified, KannalaBrandt8
-///   Kalibr        camera chain with `cam0`; pinhole with radtan, equidistant or none
-///   EuRoC         `sensor.yaml`; pinhole with radial-tangential, equidistant or none
-///   KITTI         `calib.txt`: the row P0 (all cameras of a rectified sequence share it); no size
-///   COLMAP        `cameras.txt`: SIMPLE_PINHOLE, PINHOLE, SIMPLE_RADIAL, RADIAL, OPENCV,
-///                 FULL_OPENCV, FOV, SIMPLE_RADIAL_FISHEYE, RADIAL_FISHEYE, OPENCV_FISHEYE;
-///                 several lines must agree. COLMAP puts pixel centres at one half:
-///                 cx and cy lose 0.5.
-/// Of a chain of cameras, the first. Foreign radtan files whose coefficients are all zero give
-/// kPinhole. A folder stands for the first of `camera.yaml`, `calib.txt`, `sensor.yaml`,
-/// `mav0/cam0/sensor.yaml` and `cameras.txt` in it.
+/// Reads a calibration file. Its form is told by its content; CameraForms() in camera_form.h is the
+/// table of all forms. A folder stands for the calibration file in it: `camera.yaml`, else the one
+/// that has a name of the table.
+///
+/// Radtan files whose coefficients are all zero give kPinhole. No number that is not zero is
+/// dropped: models that we lack are refused by name. What is ignored or assumed is in the notes.
 ///
 /// Our own form:
 ///   model: radtan                    # pinhole, radtan, equidistant, rational or fov
@@ -30,31 +24,46 @@ namespace rotslam {
 ///   fy: 457.296
 ///   cx: 367.215
 ///   cy: 248.375
-///   distortion: [-0.283, 0.074, 0.00019, 1.8e-05, 0]
+///   distortion: [-0.283, 0.074, 0.00019, 1.8e-05, 0]  # as DistortionNames(model) says
 ///   readout_s: 0.02                  # rolling shutter, first row to last; 0: global; left out:
 ///   not
 ///                                    # known, and 0
 ///   readout_from: top                # its first row: top, bottom, left or right; left out: top
-/// `distortion` is k1 k2 p1 p2 [k3] for radtan, k1 k2 k3 k4 for equidistant, k1 k2 p1 p2 k3 k4 k5
-/// k6 for rational, w in radians for fov, empty or left out for pinhole. Unknown keys are errors.
+/// radtan may leave k3 out; pinhole has no distortion. Unknown keys are errors.
 ///
-/// Throws std::runtime_error in one line that names file and key: no such file, kind or model not
-/// known, a number missing, malformed, not finite, or not positive where it has to be.
-Camera ReadCamera(const std::filesystem::path& path);
+/// Throws std::runtime_error in one line, "file:line: key is 'x', must be ...": no such file, no
+/// known form, a model not supported, a number missing, malformed, not finite, or not positive
+/// where it has to be. Where only some of several cameras are at fault, these have it as their
+/// `problem`.
+CameraFile ReadCameraFile(const std::filesystem::path& path);
 
-/// A file and, after a colon, the camera in it: "calib.yaml:cam1". (A path that exists as it stands
-/// is a file without a name.)
+/// A calibration file and the camera in it; no name: the one that ChooseCamera finds.
 struct CameraReference {
   std::filesystem::path file;
   std::string name;
 };
 
-/// The camera of the file that is named, or that belongs to the images in `image_folder`.
-Camera ReadCamera(const CameraReference& reference, const std::filesystem::path& image_folder = {});
+/// "calib.yaml" or "calib.yaml:cam1". A path that exists as it stands is a file without a name.
+CameraReference ParseCameraReference(const std::string& text);
 
-/// One camera of a COLMAP model from the words of its line in `cameras.txt`: id, model, width,
-/// height, parameters. Throws as ReadCamera does.
-Camera ReadColmapCamera(const std::filesystem::path& file, const std::vector<std::string>& words);
+/// The camera of `file` that `reference` names; else the only one; else the one that belongs to the
+/// images by a component of their folder's path (`cam1`, `image_2`, `left`, `right`, `image_rect`);
+/// else the first where the form says so, or where all are the same. `image_folder` may be empty.
+/// Throws std::runtime_error in one line: no camera of that name, or several that differ, with
+/// their names; or the problem of the chosen one.
+NamedCamera ChooseCamera(const CameraFile& file,
+                         const CameraReference& reference,
+                         const std::filesystem::path& image_folder);
+
+/// ReadCameraFile and ChooseCamera at once.
+/// @param image_size  width and height of the images, for files with an angle of view in place of a
+///                    focal length, which are refused without it.
+Camera ReadCamera(const CameraReference& reference,
+                  const std::filesystem::path& image_folder = {},
+                  const std::array<int, 2>& image_size = {});
+
+/// The same for a file without a name.
+Camera ReadCamera(const std::filesystem::path& file);
 
 /// `camera` in our own form; ReadCamera gives back the very same numbers.
 std::string CameraYaml(const Camera& camera);

@@ -13,8 +13,12 @@ int main(int argc, char** argv) try {
   }
   // Any source of images will do: a driver's callback, cv::VideoCapture ...
   const auto sequence = rotslam::OpenSequence(argv[1], {});
+  const cv::Size size = sequence->image_size();
   const rotslam::Camera camera =
-      rotslam::MatchToImages(rotslam::ReadCamera(argv[2]), sequence->image_size());
+      rotslam::MatchToImages(rotslam::ReadCamera(rotslam::ParseCameraReference(argv[2]),
+                                                 sequence->image_folder(),
+                                                 {size.width, size.height}),
+                             size);
   rotslam::RotationalOdometry odometry(camera, {}, /*seed=*/1, /*num_threads=*/2);
 
   std::printf("# timestamp_s qx qy qz qw (camera to world) sigma_x sigma_y sigma_z (deg)\n");
