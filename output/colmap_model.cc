@@ -135,15 +135,16 @@ struct BinaryModel {
   const char* name;
   int num_parameters;
 };
-constexpr std::array<BinaryModel, 9> kBinaryModels = {{{0, "SIMPLE_PINHOLE", 3},
-                                                       {1, "PINHOLE", 4},
-                                                       {2, "SIMPLE_RADIAL", 4},
-                                                       {3, "RADIAL", 5},
-                                                       {4, "OPENCV", 8},
-                                                       {5, "OPENCV_FISHEYE", 8},
-                                                       {6, "FULL_OPENCV", 12},
-                                                       {8, "SIMPLE_RADIAL_FISHEYE", 4},
-                                                       {9, "RADIAL_FISHEYE", 5}}};
+constexpr std::array<BinaryModel, 10> kBinaryModels = {{{0, "SIMPLE_PINHOLE", 3},
+                                                        {1, "PINHOLE", 4},
+                                                        {2, "SIMPLE_RADIAL", 4},
+                                                        {3, "RADIAL", 5},
+                                                        {4, "OPENCV", 8},
+                                                        {5, "OPENCV_FISHEYE", 8},
+                                                        {6, "FULL_OPENCV", 12},
+                                                        {7, "FOV", 5},
+                                                        {8, "SIMPLE_RADIAL_FISHEYE", 4},
+                                                        {9, "RADIAL_FISHEYE", 5}}};
 
 void ReadBinaryCameras(const fs::path& file, ModelBuilder& builder) {
   BinaryReader bytes(file);

@@ -28,7 +28,8 @@ struct ColmapModel {
 ColmapModel ReadColmapModel(const std::filesystem::path& folder);
 
 /// A camera as COLMAP has it: kPinhole is PINHOLE, kRadtan OPENCV, or FULL_OPENCV where k3 is not
-/// zero, kEquidistant OPENCV_FISHEYE; the principal point gains 0.5.
+/// zero, kEquidistant OPENCV_FISHEYE, kRational FULL_OPENCV, kFov FOV; the principal point gains
+/// 0.5. A FULL_OPENCV whose k4, k5 and k6 are zero reads back as kRadtan.
 struct ColmapCamera {
   int model_id = 0;
   std::string model;

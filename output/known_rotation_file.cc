@@ -76,23 +76,27 @@ class RowReader {
   std::size_t word_ = 0;
 };
 
+// How many coefficients the camera's line has: five, as for the models of version 0.1.0, or more
+// where the model has more. All eight are read for every model, too.
+std::size_t NumCoefficients(CameraModel model) {
+  return std::max<std::size_t>(5, DistortionNames(model).size());
+}
+
 Camera ReadCameraRow(RowReader& reader) {
   reader.Next();
   reader.Expect("camera");
   Camera camera;
   const std::string model = reader.Word();
-  bool known = false;
-  for (const CameraModel candidate :
-       {CameraModel::kPinhole, CameraModel::kRadtan, CameraModel::kEquidistant}) {
-    if (model != Name(candidate)) continue;
-    camera.model = candidate;
-    known = true;
-  }
-  if (!known) reader.Fail("model is \"" + model + "\", must be pinhole, radtan or equidistant");
+  const auto found = FindCameraModel(model);
+  if (!found) reader.Fail("model is \"" + model + "\", must be one of " + CameraModelNames());
+  camera.model = *found;
   camera.width = reader.Integer("width", 0.0);
   camera.height = reader.Integer("height", 0.0);
   for (double* value : {&camera.fx, &camera.fy, &camera.cx, &camera.cy}) *value = reader.Number();
-  for (double& value : camera.distortion) value = reader.Number();
+  const std::size_t least = NumCoefficients(camera.model);
+  const std::size_t count = reader.WordsLeft() > least ? camera.distortion.size() : least;
+  for (std::size_t k = 0; k < count; ++k) camera.distortion[k] = reader.Number();
+  if (reader.WordsLeft() > 0) reader.Fail("the line goes on behind the distortion");
   if (const auto problem = camera.Problem()) reader.Fail("camera: " + *problem);
   return camera;
 }
@@ -201,7 +205,7 @@ std::pair<Rotation, Camera> ReadBalCamera(RowReader& reader, const auto& number)
   Camera camera;
   camera.model = CameraModel::kRadtan;
   camera.fx = camera.fy = values[6];
-  camera.distortion = {values[7], values[8], 0.0, 0.0, 0.0};
+  camera.distortion = {values[7], values[8]};
   if (const auto problem = camera.Problem()) reader.Fail("camera: " + *problem);
   const Eigen::Vector3d rotation_vector(values[0], values[1], values[2]);
   if (!std::isfinite(rotation_vector.norm())) reader.Fail("a rotation vector is out of range");
@@ -309,7 +313,9 @@ void WriteKnownRotation(const fs::path& path, const KnownRotationInput& input) {
   text += std::string("camera ") + Name(camera.model) + " " + std::to_string(camera.width) + " " +
           std::to_string(camera.height);
   for (const double value : {camera.fx, camera.fy, camera.cx, camera.cy}) add("%.17g", value);
-  for (const double value : camera.distortion) add("%.17g", value);
+  for (std::size_t k = 0; k < NumCoefficients(camera.model); ++k) {
+    add("%.17g", camera.distortion[k]);
+  }
   text += "\n# view timestamp_s qx qy qz qw (camera to world) sigma_deg\nviews " +
           std::to_string(input.cam_from_world.size()) + "\n";
   for (const auto& [view, cam_from_world] : input.cam_from_world) {

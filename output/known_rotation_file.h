@@ -38,7 +38,7 @@ KnownRotationInput ReadKnownRotation(const std::filesystem::path& path);
 
 /// Writes our text form, lines of words; '#' starts a comment:
 ///   rotslam_known_rotation 1
-///   camera MODEL WIDTH HEIGHT FX FY CX CY D0 D1 D2 D3 D4
+///   camera MODEL WIDTH HEIGHT FX FY CX CY D0 D1 D2 D3 D4     D0 to D7 for rational
 ///   views N
 ///   ID TIMESTAMP_S QX QY QZ QW SIGMA_DEG      N times; camera->world; sigma 0: not known
 ///   tracks M

@@ -41,6 +41,7 @@ Json WorldFromCamera(const MapFrame& frame) {
 void WriteNerfTransforms(const std::filesystem::path& path,
                          const RunMap& map,
                          const std::filesystem::path& image_folder) {
+  RefuseLensBeyondRadtan(path, map.camera, "nerfstudio");
   std::filesystem::path images = image_folder;
   if (!images.empty()) {
     const std::filesystem::path here = std::filesystem::absolute(path).parent_path();

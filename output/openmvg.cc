@@ -5,6 +5,7 @@
 #include <nlohmann/json.hpp>
 
 #include "output/atomic_file.h"
+#include "output/distortion_json.h"
 #include "output/map_keypoints.h"
 
 namespace rotslam {
@@ -39,7 +40,7 @@ Json IntrinsicToJson(const Camera& camera, std::uint32_t number) {
                {"principal_point", {camera.cx, camera.cy}}};
   const auto& d = camera.distortion;
   std::string type = "pinhole";
-  if (camera.model == CameraModel::kRadtan) {
+  if (camera.model == CameraModel::kRadtan || camera.model == CameraModel::kRational) {
     type = "pinhole_brown_t2";
     data["disto_t2"] = {d[0], d[1], d[4], d[2], d[3]};
   } else if (camera.model == CameraModel::kEquidistant) {
@@ -83,6 +84,7 @@ Json PointToJson(const MapTrack& entry, const std::vector<int>& numbers) {
 void WriteOpenMvg(const std::filesystem::path& path,
                   const RunMap& map,
                   const std::filesystem::path& image_folder) {
+  RefuseLensBeyondRadtan(path, map.camera, "openMVG");
   std::filesystem::path root = image_folder;
   if (!root.empty()) root = std::filesystem::absolute(root).lexically_normal();
   Json json = {{"sfm_data_version", "0.3"}, {"root_path", root.string()}};

@@ -12,7 +12,8 @@ namespace rotslam {
 /// half their difference away at one focal length from the centre. Pixel centres are at integer
 /// coordinates, as here.
 /// @param image_folder  where the images are, openMVG's root path; may be empty.
-/// Throws std::runtime_error when the file cannot be written.
+/// Throws std::runtime_error when the file cannot be written, and for lenses of kRational and kFov,
+/// which openMVG has no model of.
 void WriteOpenMvg(const std::filesystem::path& path,
                   const RunMap& map,
                   const std::filesystem::path& image_folder);

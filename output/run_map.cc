@@ -1,6 +1,7 @@
 #include "output/run_map.h"
 
 #include <algorithm>
+#include <iterator>
 #include <limits>
 #include <map>
 #include <set>
@@ -13,7 +14,10 @@
 namespace rotslam {
 namespace {
 
-constexpr std::string_view kMagic = "rotslam_map 2\n";
+constexpr std::string_view kMagic = "rotslam_map 3\n";
+// As version 0.1.0 wrote it: a camera has five coefficients of its distortion instead of eight.
+constexpr std::string_view kMagicOfFive = "rotslam_map 2\n";
+static_assert(kMagic.size() == kMagicOfFive.size());
 constexpr double kMaxOwnNormError = 1e-6;
 
 void PutRotation(BinaryWriter& writer, const Rotation& rotation) {
@@ -57,10 +61,10 @@ void PutCamera(BinaryWriter& writer, const Camera& camera) {
   writer.Put(static_cast<std::int32_t>(camera.readout_from));
 }
 
-Camera GetCamera(BinaryReader& reader) {
+Camera GetCamera(BinaryReader& reader, std::size_t num_coefficients) {
   Camera camera;
   const auto model = reader.Get<std::int32_t>();
-  if (model < 0 || model > static_cast<std::int32_t>(CameraModel::kEquidistant)) {
+  if (model < 0 || model >= std::ssize(AllCameraModels())) {
     reader.Fail("camera model " + std::to_string(model) + " is not known");
   }
   camera.model = static_cast<CameraModel>(model);
@@ -69,7 +73,7 @@ Camera GetCamera(BinaryReader& reader) {
   for (double* value : {&camera.fx, &camera.fy, &camera.cx, &camera.cy}) {
     *value = reader.Get<double>();
   }
-  for (double& value : camera.distortion) value = reader.Get<double>();
+  for (std::size_t k = 0; k < num_coefficients; ++k) camera.distortion[k] = reader.Get<double>();
   camera.readout_s = reader.Get<double>();
   const auto readout_from = reader.Get<std::int32_t>();
   if (readout_from < 0 || readout_from > static_cast<std::int32_t>(ReadoutStart::kRight)) {
@@ -278,11 +282,12 @@ void WriteRunMap(const std::filesystem::path& path, const RunMap& map) {
 
 RunMap ReadRunMap(const std::filesystem::path& path) {
   BinaryReader reader(path);
-  if (reader.Take(kMagic.size()) != kMagic) {
+  const auto magic = reader.Take(kMagic.size());
+  if (magic != kMagic && magic != kMagicOfFive) {
     reader.Fail("is not a map that this version of `rotslam run` writes");
   }
   RunMap map;
-  map.camera = GetCamera(reader);
+  map.camera = GetCamera(reader, magic == kMagic ? map.camera.distortion.size() : 5);
   map.image_folder = reader.Name();
   map.is_video = reader.Get<std::uint8_t>() != 0;
   map.level_scale = reader.Get<double>();

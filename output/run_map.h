@@ -74,9 +74,9 @@ Trajectory ToTrajectory(const RunMap& map);
 /// Throws std::runtime_error when the file cannot be written.
 void WriteRunMap(const std::filesystem::path& path, const RunMap& map);
 
-/// Reads what WriteRunMap has written. Throws std::runtime_error with path and reason in one line:
-/// not such a file, cut short, counts beyond its size, ids that do not ascend or name nothing,
-/// numbers that are not finite.
+/// Reads what WriteRunMap has written, that of version 0.1.0, too. Throws std::runtime_error with
+/// path and reason in one line: not such a file, cut short, counts beyond its size, ids that do not
+/// ascend or name nothing, numbers that are not finite.
 RunMap ReadRunMap(const std::filesystem::path& path);
 
 }  // namespace rotslam

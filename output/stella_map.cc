@@ -167,6 +167,7 @@ Json LandmarksToJson(const RunMap& map, const std::vector<std::set<int>>& shown)
 void WriteStellaMap(const std::filesystem::path& path,
                     const RunMap& map,
                     const std::map<FrameId, KeypointDescriptors>& descriptors) {
+  RefuseLensBeyondRadtan(path, map.camera, "stella_vslam");
   const auto keypoints = ListKeypoints(map);
   std::vector<Json> keyframes;
   keyframes.reserve(map.frames.size());

@@ -26,7 +26,7 @@ struct KeypointDescriptors {
 /// that difference has not been measured.
 /// @param descriptors  of every frame.
 /// Throws std::invalid_argument when descriptors are missing, std::runtime_error when the file
-/// cannot be written.
+/// cannot be written, and for lenses of kRational and kFov, which stella_vslam has no model of.
 void WriteStellaMap(const std::filesystem::path& path,
                     const RunMap& map,
                     const std::map<FrameId, KeypointDescriptors>& descriptors);

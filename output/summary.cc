@@ -1,5 +1,7 @@
 #include "output/summary.h"
 
+#include <vector>
+
 #include <nlohmann/json.hpp>
 
 #include "output/atomic_file.h"
@@ -41,7 +43,13 @@ Json CameraToJson(const Camera& camera) {
                  {"fy", camera.fy},
                  {"cx", camera.cx},
                  {"cy", camera.cy}};
-  if (camera.model != CameraModel::kPinhole) object["distortion"] = camera.distortion;
+  // Five coefficients for kRadtan and kEquidistant, as in version 0.1.0.
+  const std::size_t count =
+      camera.model == CameraModel::kEquidistant ? 5 : DistortionNames(camera.model).size();
+  if (count > 0) {
+    object["distortion"] =
+        std::vector<double>(camera.distortion.begin(), camera.distortion.begin() + count);
+  }
   if (camera.readout_s != 0.0) {
     object["readout_s"] = camera.readout_s;
     object["readout_from"] = Name(camera.readout_from);

@@ -409,6 +409,14 @@ std::span<const CameraModel> AllCameraModels() {
   return kAll;
 }
 
+std::string CameraModelNames() {
+  std::string names;
+  for (const CameraModel model : AllCameraModels()) {
+    names.append(names.empty() ? "" : ", ").append(Name(model));
+  }
+  return names;
+}
+
 std::optional<CameraModel> FindCameraModel(const std::string& name) {
   for (const CameraModel model : AllCameraModels()) {
     if (name == Name(model)) return model;

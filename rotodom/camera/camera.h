@@ -24,6 +24,9 @@ std::span<const CameraModel> AllCameraModels();
 /// `pinhole`, `radtan`, `equidistant`, `rational` or `fov`, as our camera files spell it.
 const char* Name(CameraModel model);
 
+/// The names of all models, with commas between, for messages.
+std::string CameraModelNames();
+
 /// The model of this name; nullopt: none.
 std::optional<CameraModel> FindCameraModel(const std::string& name);
 

@@ -34,7 +34,9 @@ TEST_P(ColmapForms, ReadBackTheSame) {
            {CameraModel::kPinhole, {}},
            {CameraModel::kRadtan, {-0.1, 0.02, 1e-3, -2e-3, 0.0}},
            {CameraModel::kRadtan, {-0.1, 0.02, 1e-3, -2e-3, 0.003}},
-           {CameraModel::kEquidistant, {0.01, -0.02, 0.003, -0.0004, 0.0}}}) {
+           {CameraModel::kEquidistant, {0.01, -0.02, 0.003, -0.0004, 0.0}},
+           {CameraModel::kRational, {0.1, 0.02, 1e-3, -2e-3, 0.003, 0.2, 0.03, 1.0 / 3.0}},
+           {CameraModel::kFov, {1.0 / 3.0}}}) {
     map.camera.model = model;
     map.camera.distortion = distortion;
     WriteColmapModel(folder.path() / "sparse", map, GetParam());

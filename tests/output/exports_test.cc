@@ -2,6 +2,7 @@
 
 #include <cmath>
 #include <string>
+#include <vector>
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -82,6 +83,40 @@ TEST(NerfTransforms, NameEveryLens) {
   EXPECT_EQ(json["is_fisheye"], true);
   EXPECT_EQ(json["k3"], 3.0);
   EXPECT_EQ(json["k4"], 4.0);
+}
+
+TEST(Exports, RefuseALensThatTheOtherSystemHasNoModelOf) {
+  const TemporaryFolder folder;
+  const fs::path file = folder.path() / "out.json";
+  RunMap map = MapOfScene(ExportScene());
+  const auto complaints = [&] {
+    return std::vector<std::string>{
+        RuntimeErrorOf([&] { WriteNerfTransforms(file, map, "/images"); }),
+        RuntimeErrorOf([&] { WriteOpenMvg(file, map, "/images"); })};
+  };
+  map.camera.model = CameraModel::kRational;
+  map.camera.distortion = {0.3, 0.1, 0.0, 0.0, 0.0, 0.0, 0.2, 0.0};
+  for (const std::string& complaint : complaints()) {
+    EXPECT_THAT(complaint, testing::HasSubstr("out.json: is not written: "));
+    EXPECT_THAT(complaint, testing::HasSubstr("no camera model for a rational lens (k4 k5 k6)"));
+    EXPECT_THAT(complaint, testing::HasSubstr("export --to colmap"));
+    EXPECT_EQ(complaint.find('\n'), std::string::npos);
+  }
+  map.camera.model = CameraModel::kFov;
+  map.camera.distortion = {0.9};
+  for (const std::string& complaint : complaints()) {
+    EXPECT_THAT(complaint, testing::HasSubstr("no camera model for a FOV lens (w)"));
+  }
+  EXPECT_FALSE(fs::exists(file));
+  // Without a denominator it is a radtan lens.
+  map.camera.model = CameraModel::kRational;
+  map.camera.distortion = {1.0, 2.0, 3.0, 4.0, 5.0};
+  WriteNerfTransforms(file, map, "/images");
+  EXPECT_EQ(ReadJson(file)["k3"], 5.0);
+  EXPECT_EQ(ReadJson(file)["p1"], 3.0);
+  WriteOpenMvg(file, map, "/images");
+  EXPECT_EQ(ReadJson(file)["intrinsics"][0]["value"]["ptr_wrapper"]["data"]["disto_t2"],
+            (nlohmann::json{1.0, 2.0, 5.0, 3.0, 4.0}));
 }
 
 TEST(OpenMvg, ReadsBackTheSame) {

@@ -1,5 +1,6 @@
 #include "output/known_rotation_file.h"
 
+#include <array>
 #include <filesystem>
 #include <fstream>
 #include <limits>
@@ -9,6 +10,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include "rotodom/types/text_file.h"
 #include "tests/output/known_rotation_inputs.h"
 #include "tests/output/temporary_folder.h"
 
@@ -71,6 +73,33 @@ TEST(KnownRotationFile, ReadsBackWhatItHasWritten) {
   }
 }
 
+TEST(KnownRotationFile, KeepsEveryModelOfACamera) {
+  const TemporaryFolder folder;
+  const fs::path file = folder.path() / "known_rotation.txt";
+  KnownRotationInput input;
+  input.camera = SmallScene().camera;
+  input.cam_from_world[FrameId{0}] = Rotation();
+  for (const CameraModel model : AllCameraModels()) {
+    input.camera.model = model;
+    input.camera.distortion = {};
+    for (std::size_t k = 0; k < DistortionNames(model).size(); ++k) {
+      input.camera.distortion[k] = 0.01 / (1.0 + static_cast<double>(k));
+    }
+    WriteKnownRotation(file, input);
+    EXPECT_EQ(ReadKnownRotation(file).camera, input.camera);
+    const std::size_t num_words = ReadTextRows(file)[1].words.size();
+    EXPECT_EQ(num_words, model == CameraModel::kRational ? 16u : 13u) << Name(model);
+  }
+  const auto camera_of = [&](const std::string& row) {
+    folder.Write("other.txt", "rotslam_known_rotation 1\n" + row + "\nviews 0\ntracks 0\n");
+    return ReadKnownRotation(folder.path() / "other.txt").camera;
+  };
+  // Five coefficients, as version 0.1.0 wrote them, or all eight.
+  const std::string row = "camera radtan 640 480 500 500 320 240 0.1 0.2 0.3 0.4 0.5";
+  EXPECT_EQ(camera_of(row), camera_of(row + " 0 0 0"));
+  EXPECT_EQ(camera_of(row).distortion, (std::array<double, 8>{0.1, 0.2, 0.3, 0.4, 0.5}));
+}
+
 TEST(KnownRotationFile, ReadsColmapModelsTextAndBinary) {
   const TemporaryFolder folder;
   const Scene scene = SmallScene();
@@ -120,7 +149,14 @@ TEST(KnownRotationFile, SaysWhatIsWrongWithOurs) {
            {"", "is empty"},
            {"hello\n", "neither our text"},
            {"rotslam_known_rotation 2\n", ":1: the version is not 1"},
-           {"rotslam_known_rotation 1\ncamera fisheye", "model is \"fisheye\""},
+           {"rotslam_known_rotation 1\ncamera fisheye",
+            "model is \"fisheye\", must be one of pinhole, radtan, equidistant, rational, fov"},
+           {"rotslam_known_rotation 1\ncamera radtan 64 48 50 50 32 24 1 0 0 0 0 0 7 0\n",
+            "number 7 is not zero"},
+           {"rotslam_known_rotation 1\ncamera radtan 64 48 50 50 32 24 1 0 0 0 0 0 0 0 5\n",
+            ":2: the line goes on behind the distortion"},
+           {"rotslam_known_rotation 1\ncamera rational 64 48 50 50 32 24 1 0 0 0 0\n",
+            ":2: the line ends too early"},
            {"rotslam_known_rotation 1\ncamera pinhole 640 480 0 500 320 240 0 0 0 0 0\n",
             "fx is 0"},
            {head + "views 4000000000\n", "must be a whole number"},

@@ -56,6 +56,39 @@ TEST(RunMap, ReadsBackWhatItHasWritten) {
   EXPECT_EQ(read.edges[3].num_inliers, map.edges[3].num_inliers);
 }
 
+TEST(RunMap, KeepsEveryModelOfACamera) {
+  const TemporaryFolder folder;
+  RunMap map = MapOfScene(ExportScene());
+  for (const CameraModel model : AllCameraModels()) {
+    map.camera.model = model;
+    map.camera.distortion = {};
+    for (std::size_t k = 0; k < DistortionNames(model).size(); ++k) {
+      map.camera.distortion[k] = 0.01 / (1.0 + static_cast<double>(k));
+    }
+    WriteRunMap(folder.path() / "map.bin", map);
+    EXPECT_EQ(ReadRunMap(folder.path() / "map.bin").camera, map.camera);
+  }
+}
+
+TEST(RunMap, ReadsWhatVersion010HasWritten) {
+  const TemporaryFolder folder;
+  RunMap map = MapOfScene(ExportScene());
+  map.camera.model = CameraModel::kRadtan;
+  map.camera.distortion = {-0.1, 0.02, 1e-3, -2e-3, 0.003};
+  WriteRunMap(folder.path() / "map.bin", map);
+  std::string bytes = ReadWholeFile(folder.path() / "map.bin");
+  // "rotslam_map 3\n", three numbers of four bytes, fx fy cx cy and five coefficients; then three
+  // more of them, which that version did not have.
+  bytes.erase(14 + 3 * 4 + 9 * 8, 3 * 8);
+  bytes[12] = '2';
+  folder.Write("old.bin", bytes);
+  const RunMap read = ReadRunMap(folder.path() / "old.bin");
+  EXPECT_EQ(read.camera, map.camera);
+  EXPECT_EQ(read.image_folder, map.image_folder);
+  EXPECT_EQ(read.tracks.size(), map.tracks.size());
+  EXPECT_EQ(read.edges.size(), map.edges.size());
+}
+
 TEST(RunMap, BelievesNoBrokenFile) {
   const TemporaryFolder folder;
   WriteRunMap(folder.path() / "map.bin", MapOfScene(ExportScene()));

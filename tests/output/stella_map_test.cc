@@ -143,6 +143,16 @@ TEST(StellaMap, UndistortsFisheyesAndLeavesOutWhatLiesBehind) {
               1e-3);
 }
 
+TEST(StellaMap, RefusesALensThatItHasNoModelOf) {
+  const TemporaryFolder folder;
+  RunMap map = MapOfScene(ExportScene());
+  map.camera.model = CameraModel::kFov;
+  map.camera.distortion = {0.9};
+  EXPECT_THAT(
+      RuntimeErrorOf([&] { WriteStellaMap(folder.path() / "map.msg", map, SomeDescriptors(map)); }),
+      testing::HasSubstr("stella_vslam has no camera model for a FOV lens"));
+}
+
 TEST(StellaMap, WantsADescriptorForEachKeypoint) {
   const TemporaryFolder folder;
   const RunMap map = MapOfScene(ExportScene());

@@ -98,6 +98,20 @@ TEST(Summary, TellsOfARollingShutter) {
   EXPECT_EQ(nlohmann::json::parse(SummaryJson(summary))["camera"]["readout_from"], "top");
 }
 
+TEST(Summary, TellsTheDistortionOfEveryModel) {
+  RunSummary summary;
+  summary.camera = Camera{};
+  const auto distortion = [&](CameraModel model) {
+    summary.camera->model = model;
+    return nlohmann::json::parse(SummaryJson(summary))["camera"]["distortion"].size();
+  };
+  EXPECT_EQ(distortion(CameraModel::kPinhole), 0u);
+  EXPECT_EQ(distortion(CameraModel::kRadtan), 5u);
+  EXPECT_EQ(distortion(CameraModel::kEquidistant), 5u);
+  EXPECT_EQ(distortion(CameraModel::kRational), 8u);
+  EXPECT_EQ(distortion(CameraModel::kFov), 1u);
+}
+
 TEST(Summary, LeavesOutWhatDidNotRun) {
   const auto json = nlohmann::json::parse(SummaryJson({}));
   for (const char* key : {"krot", "ba", "segments", "loops", "camera"}) {
