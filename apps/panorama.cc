@@ -1,3 +1,4 @@
+#include <algorithm>
 #include <cstdio>
 #include <filesystem>
 #include <memory>
@@ -47,17 +48,25 @@ Camera CameraOf(const nlohmann::ordered_json& summary, const std::string& path) 
   try {
     const nlohmann::ordered_json& json = summary.at("camera");
     Camera camera;
-    for (const CameraModel model :
-         {CameraModel::kPinhole, CameraModel::kRadtan, CameraModel::kEquidistant}) {
-      if (json.at("model").get<std::string>() == Name(model)) camera.model = model;
-    }
+    const std::string model = json.at("model");
+    const auto found = FindCameraModel(model);
+    if (!found) throw std::runtime_error("model must be one of " + CameraModelNames());
+    camera.model = *found;
     camera.width = json.at("width");
     camera.height = json.at("height");
     camera.fx = json.at("fx");
     camera.fy = json.at("fy");
     camera.cx = json.at("cx");
     camera.cy = json.at("cy");
-    if (json.contains("distortion")) camera.distortion = json.at("distortion");
+    if (json.contains("distortion")) {
+      const std::vector<double> distortion = json.at("distortion");
+      if (distortion.size() > camera.distortion.size()) {
+        throw std::runtime_error("distortion has " + std::to_string(distortion.size()) +
+                                 " numbers, must be at most " +
+                                 std::to_string(camera.distortion.size()));
+      }
+      std::copy(distortion.begin(), distortion.end(), camera.distortion.begin());
+    }
     if (json.contains("readout_s")) camera.readout_s = json.at("readout_s");
     if (json.contains("readout_from")) {
       const auto start = FindReadoutStart(json.at("readout_from"));

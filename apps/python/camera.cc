@@ -18,6 +18,11 @@ using namespace py::literals;  // NOLINT(google-build-using-namespace): "name"_a
 namespace rotslam {
 namespace {
 
+// How long `distortion` is: five, as in version 0.1.0, or more where the model has more.
+std::size_t NumCoefficients(CameraModel model) {
+  return std::max<std::size_t>(5, DistortionNames(model).size());
+}
+
 Camera MakeCamera(double fx,
                   double fy,
                   double cx,
@@ -29,20 +34,15 @@ Camera MakeCamera(double fx,
                   double readout_s,
                   const std::string& readout_from) {
   Camera camera;
-  bool is_known = false;
-  for (const CameraModel known :
-       {CameraModel::kPinhole, CameraModel::kRadtan, CameraModel::kEquidistant}) {
-    if (model != Name(known)) continue;
-    camera.model = known;
-    is_known = true;
+  const auto found = FindCameraModel(model);
+  if (!found) {
+    throw std::invalid_argument("model is \"" + model + "\", must be one of " + CameraModelNames());
   }
-  if (!is_known) {
-    throw std::invalid_argument("model is \"" + model +
-                                "\", must be pinhole, radtan or equidistant");
-  }
-  if (distortion.size() > camera.distortion.size()) {
+  camera.model = *found;
+  if (distortion.size() > NumCoefficients(camera.model)) {
     throw std::invalid_argument("distortion has " + std::to_string(distortion.size()) +
-                                " numbers, must be at most 5");
+                                " numbers, must be at most " +
+                                std::to_string(NumCoefficients(camera.model)));
   }
   std::copy(distortion.begin(), distortion.end(), camera.distortion.begin());
   camera.fx = fx;
@@ -81,9 +81,11 @@ void AddCamera(py::module_& module) {
   py::class_<Camera>(module, "Camera", R"(A calibrated camera: x right, y down, z forward.
 
 Lengths in pixels, pixel centres at integer coordinates. model is "pinhole", "radtan" (OpenCV:
-k1 k2 p1 p2 k3) or "equidistant" (k1 k2 k3 k4). readout_s: rolling shutter, seconds from the
-first row to the last; 0 for a global one. readout_from: where its first row is, "top", "bottom",
-"left" or "right".)")
+k1 k2 p1 p2 k3), "equidistant" (OpenCV's fisheye: k1 k2 k3 k4), "rational" (OpenCV: k1 k2 p1 p2
+k3 k4 k5 k6) or "fov" (w, in radians). distortion holds these; zeros at the end may be left out,
+and are filled up to five numbers.
+readout_s: rolling shutter, seconds from the first row to the last; 0 for a global one.
+readout_from: where its first row is, "top", "bottom", "left" or "right".)")
       .def(py::init(&MakeCamera),
            "fx"_a,
            "fy"_a,
@@ -101,7 +103,12 @@ first row to the last; 0 for a global one. readout_from: where its first row is,
       .def_readonly("cy", &Camera::cy)
       .def_readonly("width", &Camera::width)
       .def_readonly("height", &Camera::height)
-      .def_readonly("distortion", &Camera::distortion)
+      .def_property_readonly("distortion",
+                             [](const Camera& camera) {
+                               const auto begin = camera.distortion.begin();
+                               return std::vector<double>(begin,
+                                                          begin + NumCoefficients(camera.model));
+                             })
       .def_readonly("readout_s", &Camera::readout_s)
       .def_property_readonly("readout_from",
                              [](const Camera& camera) { return Name(camera.readout_from); })

@@ -145,6 +145,11 @@ std::vector<std::string> WriteSequence(const Simulation& simulation,
     throw std::invalid_argument(
         "EuRoC's sensor.yaml has no place for a rolling shutter; use the layout tum");
   }
+  const CameraModel model = simulation.GetCamera().model;
+  if (euroc && (model == CameraModel::kRational || model == CameraModel::kFov)) {
+    throw std::invalid_argument(std::string("EuRoC's sensor.yaml has no place for a ") +
+                                Name(model) + " lens; use the layout tum");
+  }
   const fs::path folder = euroc ? "mav0/cam0/data" : "rgb";
   const int count = simulation.NumFrames();
   std::vector<std::string> names;

@@ -136,8 +136,14 @@ TEST(Simulation, SamePointLooksTheSameFromTwoPlaces) {
   Camera fisheye = CameraWithView(320, 240, 90.0);
   fisheye.model = CameraModel::kEquidistant;
   fisheye.distortion = {0.02, -0.01, 0.003, -0.001, 0.0};
+  Camera rational = CameraWithView(320, 240, 80.0);
+  rational.model = CameraModel::kRational;
+  rational.distortion = {3.1, 1.4, 5e-4, -7e-4, 0.06, 3.4, 2.2, 0.32};
+  Camera fov = CameraWithView(320, 240, 90.0);
+  fov.model = CameraModel::kFov;
+  fov.distortion = {0.9};
   for (const SimulationKind kind : kKinds) {
-    for (const Camera& camera : {CameraWithView(320, 240, 65.0), radtan, fisheye}) {
+    for (const Camera& camera : {CameraWithView(320, 240, 65.0), radtan, fisheye, rational, fov}) {
       SimulationOptions options;
       options.kind = kind;
       options.camera = camera;
@@ -687,6 +693,16 @@ TEST(WriteSequence, EurocFilesAreTheSameAtAnyNumberOfThreads) {
 TEST(WriteSequence, RefusesALayoutThatCannotTellOfARollingShutter) {
   SimulationOptions options = Small(SimulationKind::kHandheld);
   options.camera.readout_s = 0.02;
+  const Folder folder;
+  WriteOptions write;
+  write.layout = SequenceLayout::kEuroc;
+  EXPECT_THROW(WriteSequence(Simulation(options), folder.Path(), write), std::invalid_argument);
+}
+
+TEST(WriteSequence, RefusesALayoutThatCannotTellOfTheLens) {
+  SimulationOptions options = Small(SimulationKind::kHandheld);
+  options.camera.model = CameraModel::kFov;
+  options.camera.distortion = {0.9};
   const Folder folder;
   WriteOptions write;
   write.layout = SequenceLayout::kEuroc;

@@ -181,6 +181,11 @@ class OptionsAndCameras(unittest.TestCase):
         camera = rotslam.Camera(250, 251, 160, 120, 320, 240, "radtan", [0.1, 0.2])
         self.assertEqual((camera.model, camera.fy, camera.distortion),
                          ("radtan", 251, [0.1, 0.2, 0, 0, 0]))
+        rational = rotslam.Camera(250, 251, 160, 120, 320, 240, "rational",
+                                  [3.1, 1.4, 0, 0, 0.06, 3.4, 2.2, 0.32])
+        self.assertEqual(rational.distortion, [3.1, 1.4, 0, 0, 0.06, 3.4, 2.2, 0.32])
+        fov = rotslam.Camera(250, 251, 160, 120, 320, 240, "fov", [0.9])
+        self.assertEqual((fov.model, fov.distortion), ("fov", [0.9, 0, 0, 0, 0]))
         upright = rotslam.Camera(250, 250, 120, 160, 240, 320, readout_s=0.02, readout_from="right")
         self.assertEqual((upright.readout_s, upright.readout_from), (0.02, "right"))
         for wrong in ({"fx": -1}, {"model": "fisheye"}, {"distortion": [0] * 6},
