@@ -57,9 +57,7 @@ NumberTable ReadNumberTable(const CameraDocument& document) {
 bool IsMatrixTable(const NumberTable& table) {
   if (table.size() == 1) {
     const std::vector<std::string>& words = table[0].words;
-    const auto is = [&](std::size_t k, double wanted) {
-      return IsNumber(words[k]) && std::stod(words[k]) == wanted;
-    };
+    const auto is = [&](std::size_t k, double wanted) { return NumberOf(words[k]) == wanted; };
     return words.size() == 9 && is(1, 0.0) && is(3, 0.0) && is(6, 0.0) && is(7, 0.0) && is(8, 1.0);
   }
   if (table.size() != 3 && table.size() != 4) return false;

@@ -82,9 +82,10 @@ int PixelCount(const fs::path& file, int line, const std::string& key, const std
   return static_cast<int>(value);
 }
 
-bool IsNumber(const std::string& text) {
-  double ignored = 0.0;
-  return ParseNumber(text, ignored);
+std::optional<double> NumberOf(const std::string& text) {
+  double value = 0.0;
+  if (!ParseNumber(text, value)) return std::nullopt;
+  return value;
 }
 
 std::string Lower(std::string text) {
@@ -275,10 +276,13 @@ void ReadSize(const Section& section,
   width = section.PixelsOrZero(width_key);
   height = section.PixelsOrZero(height_key);
   if ((width == 0) == (height == 0)) return;
-  section.Fail(width == 0 ? width_key : height_key,
-               "is missing or 0, and " + section.FullKey(width == 0 ? height_key : width_key) +
-                   " is " + std::to_string(std::max(width, height)) +
-                   "; give both, or none and the images decide");
+  const std::string& missing = width == 0 ? width_key : height_key;
+  const std::string& given = width == 0 ? height_key : width_key;
+  FailAt(section.file(),
+         section.Line(section.Has(missing) ? missing : given),
+         section.FullKey(missing) + " is missing or 0, and " + section.FullKey(given) + " is " +
+             std::to_string(std::max(width, height)) +
+             "; give both, or none and the images decide");
 }
 
 void ReadSizeList(const Section& section, const std::string& key, int& width, int& height) {

@@ -39,8 +39,10 @@ int PixelCount(const std::filesystem::path& file,
                const std::string& key,
                const std::string& text);
 
-/// True where the whole text is a number, finite or not.
-bool IsNumber(const std::string& text);
+/// The number that the whole text is, finite or not; nullopt where it is something else.
+std::optional<double> NumberOf(const std::string& text);
+
+inline bool IsNumber(const std::string& text) { return NumberOf(text).has_value(); }
 
 /// ASCII letters in lower case.
 std::string Lower(std::string text);

@@ -16,6 +16,15 @@ std::string MatrixName(const std::string& word) {
   return is_name ? word.substr(0, 2) : "";
 }
 
+// False for the key of a YAML file: "P1: !!opencv-matrix", "P1: [", or "P1:" above "rows: 3".
+bool IsMatrixRow(const std::vector<TextRow>& rows, std::size_t r) {
+  const std::vector<std::string>& words = rows[r].words;
+  if (MatrixName(words[0]).empty()) return false;
+  if (words.size() > 1) return words[1].front() != '!' && words[1].front() != '[';
+  if (words[0].size() > 3) return words[0][3] != '!' && words[0][3] != '[';
+  return r + 1 == rows.size() || IsNumber(rows[r + 1].words[0]);
+}
+
 struct Word {
   int line = 0;
   std::string text;
@@ -70,16 +79,17 @@ CameraForm CameraFormKittiOdometry() {
   form.description = "KITTI odometry and objects: rows `P0: fx 0 cx . 0 fy cy . 0 0 1 .` to `P3:`";
   form.file_names = {"calib.txt"};
   form.recognises = [](const CameraDocument& document) {
-    for (const TextRow& row : document.rows()) {
-      if (!MatrixName(row.words[0]).empty()) return true;
+    for (std::size_t r = 0; r < document.rows().size(); ++r) {
+      if (IsMatrixRow(document.rows(), r)) return true;
     }
     return false;
   };
   form.read = [](const CameraDocument& document) {
     CameraFile file;
     for (std::size_t r = 0; r < document.rows().size(); ++r) {
-      const std::string name = MatrixName(document.rows()[r].words[0]);
-      if (!name.empty()) file.Add(name, [&] { return ReadKittiMatrix(document, r); });
+      if (!IsMatrixRow(document.rows(), r)) continue;
+      file.Add(MatrixName(document.rows()[r].words[0]),
+               [&] { return ReadKittiMatrix(document, r); });
     }
     return file;
   };

@@ -21,12 +21,8 @@ Camera ReadOrbSlamLens(const Section& root, const std::string& lens) {
   Camera camera;
   const std::string width = common.Has("width") || !common.Has("cols") ? "width" : "cols";
   ReadSize(common, width, width == "cols" ? "rows" : "height", camera.width, camera.height);
-  camera.fx = section.Positive("fx");
-  camera.fy = section.Positive("fy");
-  camera.cx = section.Number("cx");
-  camera.cy = section.Number("cy");
   if (type == "pinhole") {
-    if (common.Flag("bFishEye")) {
+    if (!common.Has("type") && common.Flag("bFishEye")) {
       common.FailValue("bFishEye",
                        "but no Camera.type says which model; write Camera.type: KannalaBrandt8");
     }
@@ -39,6 +35,10 @@ Camera ReadOrbSlamLens(const Section& root, const std::string& lens) {
   } else {
     common.FailValue("type", "must be PinHole, Rectified or KannalaBrandt8");
   }
+  camera.fx = section.Positive("fx");
+  camera.fy = section.Positive("fy");
+  camera.cx = section.Number("cx");
+  camera.cy = section.Number("cy");
   return camera;
 }
 

@@ -92,7 +92,7 @@ const std::map<std::string, CalibrationCase>& Cases() {
       {"ros_ost.yaml", {Radtan(), "", "", "rectified"}},
       {"sfm_data.json",
        {CameraOfNumbers(kRadtan, {480, 360}, {381, 381, 250, 172}, {-0.28, 0.09, 0, 0, -0.01})}},
-      {"stella_flat_equirect.yaml", {{}, ":4: Camera.model is 'equirectangular', which is not"}},
+      {"stella_flat_equirect.yaml", {{}, ":3: Camera.model is 'equirectangular', which is not"}},
       {"stella_flat_fisheye.yaml", {Fisheye()}},
       {"stella_flat_radialdivision.yaml", {{}, ":3: Camera.model is 'radial_division', which is"}},
       {"stella_nested_equirect.yaml", {{}, ":4: Camera.model is 'equirectangular', which is not"}},

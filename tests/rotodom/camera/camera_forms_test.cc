@@ -234,6 +234,11 @@ TEST(CameraForms, OpenCvStereoPair) {
   EXPECT_EQ(ReadChosen(text, "", "/data/right").fx, 390.0);
   EXPECT_EQ(ReadChosen(text, "", "/data/left/").fx, 380.0);
   EXPECT_THAT(CalibrationComplaint(text), HasSubstr("cameras that differ: M1, M2"));
+  EXPECT_EQ(ReadChosen(text + "P1: !!opencv-matrix\n   rows: 1\n   cols: 1\n   data: [ 1. ]\n"
+                              "P2:\n   rows: 1\n   cols: 1\n   data: [ 1. ]\n",
+                       "M2")
+                .fx,
+            390.0);
 }
 
 TEST(CameraForms, OpenCvXmlKnowsItsLines) {
@@ -304,6 +309,9 @@ TEST(CameraForms, MatrixAlone) {
   EXPECT_EQ(ReadChosen("577.5 0 319.5\n0 578.7 239.5\n0 0 1\n"), camera);
   EXPECT_EQ(ReadChosen("577.5 0 319.5 0 578.7 239.5 0 0 1\n"), camera);
   EXPECT_THAT(CalibrationComplaint("577.5 1 319.5\n0 578.7 239.5\n0 0 1\n"), HasSubstr("skew"));
+  // A number too small for a double is none.
+  EXPECT_THAT(CalibrationComplaint("380.5, 1e-400, 320, 240, 0, 0, 0, 0, 0\n"),
+              HasSubstr("calib.txt"));
 }
 
 TEST(CameraForms, Nerfstudio) {
