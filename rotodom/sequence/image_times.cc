@@ -60,6 +60,23 @@ Table ReadTable(const fs::path& file) {
   return table;
 }
 
+// One column of numbers with a decimal comma, which looks like two: "0,05". An index would increase
+// from line to line.
+void JoinDecimalCommas(Table& table) {
+  bool increases = true;
+  for (std::size_t k = 0; k < table.rows.size(); ++k) {
+    const std::vector<std::string>& cells = table.rows[k].cells;
+    if (cells.size() != 2 || !AllDigits(cells[0]) || !AllDigits(cells[1]) ||
+        table.rows[k].line.text != cells[0] + "," + cells[1]) {
+      return;
+    }
+    increases =
+        increases && (k == 0 || ParseInteger(cells[0]) > ParseInteger(table.rows[k - 1].cells[0]));
+  }
+  if (increases) return;
+  for (TableRow& row : table.rows) row.cells = {row.line.text};
+}
+
 // The number at the end of a name: 12 of "frame_000012".
 std::optional<std::int64_t> NumberOfName(const std::string& stem) {
   const std::size_t last = stem.find_last_not_of("0123456789");
@@ -125,10 +142,11 @@ std::string SourceOfList(const fs::path& list, const SpokenTimes& times) {
   return times.unit == "seconds" ? name : name + " (" + times.unit + ")";
 }
 
+// As times do, but for some lines that are at fault.
 bool MostlyIncrease(const std::vector<double>& values) {
   std::size_t count = 0;
   for (std::size_t k = 1; k < values.size(); ++k) count += values[k] > values[k - 1] ? 1 : 0;
-  return 10 * (count + 1) >= 9 * values.size();
+  return 2 * count + 1 >= values.size();
 }
 
 // The times of the first column that holds some; nullopt: none does.
@@ -153,7 +171,7 @@ std::optional<SpokenTimes> TimesOfTable(const fs::path& list,
       // Dates and numbers, or whole numbers that could be of frames.
       continue;
     }
-    if (MostlyIncrease(times->times_s)) return times;
+    if (name_column || MostlyIncrease(times->times_s)) return times;
   }
   return std::nullopt;
 }
@@ -176,7 +194,8 @@ std::optional<ListedTimes> TimesOfList(const fs::path& list,
                                        std::vector<std::string>& notes) {
   // A table of another name may be about anything.
   const bool is_certain = LowerExtension(list) != ".csv";
-  const Table table = ReadTable(list);
+  Table table = ReadTable(list);
+  JoinDecimalCommas(table);
   const std::string name = list.filename().string();
   const auto refuse = [&](const std::string& reason) {
     if (is_certain) notes.push_back(list.string() + " " + reason + ": not used");

@@ -37,15 +37,6 @@ bool IsDate(double seconds) {
   return seconds >= kYear2000 && seconds < kYear2100;
 }
 
-// The unit in which all values are dates; 0: none.
-std::int64_t TicksOfDates(const std::vector<double>& values) {
-  for (const std::int64_t ticks : kTicksPerSecond) {
-    const auto is_date = [&](double value) { return IsDate(value / static_cast<double>(ticks)); };
-    if (!values.empty() && std::all_of(values.begin(), values.end(), is_date)) return ticks;
-  }
-  return 0;
-}
-
 // Median distance of neighbours that differ; 0 without any.
 double MedianStep(const std::vector<double>& values) {
   std::vector<double> steps;
@@ -56,6 +47,22 @@ double MedianStep(const std::vector<double>& values) {
   const auto middle = steps.begin() + static_cast<std::ptrdiff_t>(steps.size() / 2);
   std::nth_element(steps.begin(), middle, steps.end());
   return *middle;
+}
+
+// The unit in which all values are dates; 0: none. Nanoseconds since a camera was switched on may
+// look like dates in milliseconds or microseconds, but frames would be far apart.
+std::int64_t TicksOfDates(const std::vector<double>& values) {
+  constexpr std::array<double, 4> kMostSecondsApart = {600.0, 600.0, 10.0, 1e9};  // by the unit
+  const double step = MedianStep(values);
+  for (std::size_t k = 0; k < kTicksPerSecond.size(); ++k) {
+    const auto scale = static_cast<double>(kTicksPerSecond[k]);
+    const auto is_date = [&](double value) { return IsDate(value / scale); };
+    if (!values.empty() && step / scale < kMostSecondsApart[k] &&
+        std::all_of(values.begin(), values.end(), is_date)) {
+      return kTicksPerSecond[k];
+    }
+  }
+  return 0;
 }
 
 // The unit in which `step` is one of frames: 1000 to 1 a second. 0: it is too small to tell.
@@ -108,6 +115,13 @@ NameParts CutName(std::string_view name) {
 // One run of digits of all names.
 using DigitColumn = std::vector<std::string>;
 
+// Dates beside numbers that are far from being some: not all are written in the same way.
+bool HoldsSomeDates(const std::vector<double>& values) {
+  constexpr double kFar = 100.0;
+  const auto [least, most] = std::minmax_element(values.begin(), values.end());
+  return values.size() > 1 && *most > kFar * *least && TicksOfDates({*most}) > 1;
+}
+
 std::optional<SpokenTimes> TimesOfTicks(const DigitColumn& column) {
   std::vector<std::int64_t> ticks;
   std::vector<double> values;
@@ -121,6 +135,7 @@ std::optional<SpokenTimes> TimesOfTicks(const DigitColumn& column) {
   if (unit == 1) return std::nullopt;  // ten digits could be anything
   std::string name = UnitName(unit) + " since 1970";
   if (unit == 0) {
+    if (HoldsSomeDates(values)) return std::nullopt;
     // Numbers of frames step by little, hardly ever by as much as 1000.
     constexpr double kLeastStep = 1000.0;
     const double step = MedianStep(values);
@@ -201,6 +216,16 @@ std::optional<SpokenTimes> TimesWithPoint(const DigitColumn& seconds,
   return times;
 }
 
+// Then the first may number the frames, and the second is a time that never begins anew.
+bool BothIncrease(const DigitColumn& seconds, const DigitColumn& counts) {
+  bool both = seconds.size() > 1;
+  for (std::size_t k = 1; k < seconds.size(); ++k) {
+    both = both && ParseInteger(seconds[k]) > ParseInteger(seconds[k - 1]) &&
+           ParseInteger(counts[k]) > ParseInteger(counts[k - 1]);
+  }
+  return both;
+}
+
 std::optional<SpokenTimes> TimesOfPair(const DigitColumn& seconds, const DigitColumn& counts) {
   std::vector<double> values;
   for (const std::string& digits : seconds) {
@@ -209,7 +234,7 @@ std::optional<SpokenTimes> TimesOfPair(const DigitColumn& seconds, const DigitCo
   const std::size_t longest = LongestOf(counts);
   // Without a date the second number must be of a size that numbers of frames do not have.
   const bool is_date = TicksOfDates(values) == 1;
-  if (!is_date && longest < 8) return std::nullopt;
+  if (!is_date && (longest < 8 || BothIncrease(seconds, counts))) return std::nullopt;
   const std::size_t digits = longest > 6 ? 9 : 6;
   const auto times_s = TimesOfCounts(seconds, counts, digits);
   if (!times_s) return std::nullopt;

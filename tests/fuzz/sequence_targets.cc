@@ -48,6 +48,38 @@ const RegisterFuzzTarget tum_list("tum_list",
                                     FindLayout(place, {});
                                   });
 
+const RegisterFuzzTarget association_list(
+    "association_list", [](std::string_view bytes, const TemporaryFolder& folder) {
+      const fs::path place = Place(folder, "icl", {"rgb/0.png", "rgb/1.png", "depth/0.png"});
+      folder.Write("icl/associations.txt", std::string(bytes));
+      FindLayout(place, {});
+    });
+
+// A list beside images of whose lines nothing is known.
+const RegisterFuzzTarget time_list(
+    "time_list", [](std::string_view bytes, const TemporaryFolder& folder) {
+      const fs::path place = Place(
+          folder, "timed", {"images/f0.png", "images/f1.png", "images/f2.png", "images/f3.png"});
+      folder.Write("timed/times.txt", std::string(bytes));
+      FindLayout(place, {});
+    });
+
+const RegisterFuzzTarget kitti_raw_times(
+    "kitti_raw_times", [](std::string_view bytes, const TemporaryFolder& folder) {
+      const fs::path place =
+          Place(folder, "raw", {"image_00/data/0000000000.png", "image_00/data/0000000001.png"});
+      folder.Write("raw/image_00/timestamps.txt", std::string(bytes));
+      FindLayout(place, {});
+    });
+
+const RegisterFuzzTarget scannet_camera(
+    "scannet_camera", [](std::string_view bytes, const TemporaryFolder& folder) {
+      const fs::path place = Place(folder, "scannet", {"color/0.jpg", "pose/0.txt"});
+      fs::create_directories(place / "intrinsic");
+      folder.Write("scannet/intrinsic/intrinsic_color.txt", std::string(bytes));
+      FindLayout(place, {});
+    });
+
 // Names of images, one a line: their order and times.
 const RegisterFuzzTarget image_names("image_names",
                                      [](std::string_view bytes, const TemporaryFolder&) {

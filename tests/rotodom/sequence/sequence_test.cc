@@ -453,10 +453,9 @@ TEST_F(SequenceTest, ReadsDoublesAndColourFloats) {
 TEST_F(SequenceTest, RefusesTimestampsThatDoNotIncrease) {
   for (const char* name : {"a.png", "b.png", "c.png"}) WriteImage(name);
   WriteText("rgb.txt", "1.0 a.png\n2.5 b.png\n2.5 c.png\n");
-  EXPECT_THAT(
-      Complaint(folder_),
-      testing::AllOf(HasSubstr("rgb.txt:3: c.png: timestamp 2.500000000 s is not later"),
-                     HasSubstr("b.png in line 2")));
+  EXPECT_THAT(Complaint(folder_),
+              testing::AllOf(HasSubstr("rgb.txt:3: c.png: timestamp 2.500000000 s is not later"),
+                             HasSubstr("b.png in line 2")));
   WriteText("rgb.txt", "1.0 a.png\n0.5 b.png\n");
   EXPECT_THAT(Complaint(folder_), HasSubstr("b.png: timestamp 0.5"));
   SequenceOptions options;
