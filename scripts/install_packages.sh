@@ -10,7 +10,8 @@ packages=(
   # tools
   cmake g++ ninja-build pkg-config
   # rotodom
-  libeigen3-dev libheif-dev libopencv-dev libtinyxml2-dev libyaml-cpp-dev nlohmann-json3-dev
+  libavcodec-dev libavformat-dev libavutil-dev libeigen3-dev libheif-dev libopencv-dev libswscale-dev libtinyxml2-dev
+  libyaml-cpp-dev nlohmann-json3-dev
   # ROS bags: their compressed chunks; SQLite is below
   libbz2-dev liblz4-dev libzstd-dev
   # krot and ba

@@ -10,13 +10,10 @@
 #include <utility>
 
 #include <opencv2/core.hpp>
-#include <opencv2/videoio.hpp>
-#include <opencv2/videoio/registry.hpp>
 
 #include "rotodom/sequence/image_file.h"
 #include "rotodom/sequence/layout.h"
 #include "rotodom/sequence/sequence_form.h"
-#include "rotodom/sequence/video.h"
 #include "rotodom/types/text_file.h"
 
 namespace rotslam {
@@ -139,111 +136,6 @@ class FileSequence : public Sequence {
   int next_ = 0;
   // Image next_, decoded while the caller works on the one before.
   std::future<DecodedImage> ahead_;
-};
-
-// FFmpeg where OpenCV has it: with any other back end allowed, a file that is no video makes each
-// of them complain on stderr in turn.
-int VideoBackEnd() {
-  return cv::videoio_registry::hasBackend(cv::CAP_FFMPEG) ? cv::CAP_FFMPEG : cv::CAP_ANY;
-}
-
-class VideoSequence : public Sequence {
- public:
-  VideoSequence(Layout layout, const SequenceOptions& options)
-      : Sequence(layout), options_(options) {
-    place_ = image_folder_ = std::move(layout.folder);
-    Probe();
-    capture_.open(place_.string(), VideoBackEnd());
-    while (number_ <= options.first) {
-      if (!Grab()) FailBeyondEnd(place_, options.first, number_);
-    }
-    const double claimed = capture_.get(cv::CAP_PROP_FRAME_COUNT);
-    if (claimed > 0.0 && claimed < 1e9) {
-      int last = static_cast<int>(claimed) - 1;
-      if (options.last >= 0) last = std::min(last, options.last);
-      num_frames_ = std::max(0, last - options.first) / options.stride + 1;
-    }
-  }
-
-  void Skip(int count) override {
-    for (int k = 0; k < count && Advance(); ++k) timestamps_s_.push_back(time_s_);
-  }
-
-  std::vector<fs::path> Files() const override { return {place_}; }
-
- private:
-  // Reads the first frames once: is there a picture, and do their timestamps increase?
-  void Probe() {
-    constexpr int kProbedFrames = 10;
-    cv::VideoCapture capture(place_.string(), VideoBackEnd());
-    if (!capture.isOpened()) {
-      throw std::runtime_error(place_.string() + ": not a video that OpenCV can open, or cut off");
-    }
-    double previous_ms = -1.0;
-    for (int k = 0; k < kProbedFrames && capture.grab(); ++k) {
-      const double time_ms = capture.get(cv::CAP_PROP_POS_MSEC);
-      has_timestamps_ = has_timestamps_ && std::isfinite(time_ms) && time_ms > previous_ms;
-      previous_ms = time_ms;
-      cv::Mat image;
-      if (image_size_.empty() && capture.retrieve(image)) image_size_ = image.size();
-    }
-    if (image_size_.empty()) {
-      throw std::runtime_error(place_.string() + ": video without a readable frame");
-    }
-  }
-
-  // Steps to the next frame of the file; false after the last.
-  bool Grab() {
-    if (!capture_.grab()) return false;
-    ++number_;
-    const double fallback_s = has_timestamps_ ? time_s_ + 1.0 / options_.fps  // a gap in good ones
-                                              : (number_ - 1) / options_.fps;
-    const double own_s = capture_.get(cv::CAP_PROP_POS_MSEC) / 1000.0;
-    const bool own_is_good =
-        has_timestamps_ && std::isfinite(own_s) && (number_ == 1 || own_s > time_s_);
-    time_s_ = own_is_good ? own_s : fallback_s;
-    return true;
-  }
-
-  // Steps to the next frame to give; false after the last. The first one is there from the start.
-  bool Advance() {
-    if (timestamps_s_.empty()) return true;
-    const bool beyond_last = options_.last >= 0 && number_ - 1 > options_.last - options_.stride;
-    if (ended_ || beyond_last) return false;
-    for (int k = 0; k < options_.stride && !ended_; ++k) ended_ = !Grab();
-    return !ended_;
-  }
-
-  std::optional<Frame> Decode() override {
-    if (!Advance()) {
-      num_frames_ = static_cast<int>(timestamps_s_.size());
-      return std::nullopt;
-    }
-    Frame frame;
-    frame.id = FrameId{static_cast<int>(timestamps_s_.size())};
-    frame.timestamp_s = time_s_;
-    std::ostringstream name;
-    name << std::setw(6) << std::setfill('0') << number_ - 1;
-    frame.name = name.str();
-    timestamps_s_.push_back(time_s_);
-    cv::Mat image;
-    if (capture_.retrieve(image) && !image.empty()) {
-      // The capture reuses its buffer.
-      DecodedImage decoded = ToEightBits(image.clone());
-      frame.image = std::move(decoded.image);
-      frame.problem = std::move(decoded.problem);
-    } else {
-      frame.problem = "frame of the video cannot be decoded";
-    }
-    return frame;
-  }
-
-  SequenceOptions options_;
-  cv::VideoCapture capture_;
-  bool has_timestamps_ = true;
-  bool ended_ = false;
-  int number_ = 0;       // frames of the file grabbed so far
-  double time_s_ = 0.0;  // of the frame grabbed last
 };
 
 }  // namespace

@@ -2,6 +2,7 @@
 
 #include <cstddef>
 #include <filesystem>
+#include <map>
 #include <memory>
 #include <optional>
 #include <string>
@@ -87,11 +88,19 @@ class Sequence {
   /// Where the times come from, a short phrase: "times.txt", "file names (ns since 1970)".
   const std::string& times_source() const { return times_source_; }
 
-  /// True when frames are numbered and SequenceOptions::fps is believed.
+  /// True when frames are numbered and SequenceOptions::fps, or a rate that the input says, is
+  /// believed.
   bool times_are_made_up() const { return times_are_made_up_; }
 
-  /// What was assumed, left out or ignored; one line each.
+  /// What was assumed, left out or ignored; one line each. A video may add some at its end.
   const std::vector<std::string>& notes() const { return notes_; }
+
+  /// The side of the images that the sensor's first row is on, where the input tells: a video turns
+  /// what a sensor has read from its top.
+  const std::optional<ReadoutStart>& readout_from() const { return readout_from_; }
+
+  /// Tags of a video file: camera, lens, place, date; in the file's own spelling.
+  const std::map<std::string, std::string>& metadata() const { return metadata_; }
 
   /// Folder that Frame::name is in; for a video, the file.
   const std::filesystem::path& image_folder() const { return image_folder_; }
@@ -123,6 +132,8 @@ class Sequence {
   std::string times_source_;
   bool times_are_made_up_ = false;
   std::vector<std::string> notes_;
+  std::optional<ReadoutStart> readout_from_;
+  std::map<std::string, std::string> metadata_;
   std::filesystem::path place_;
   std::filesystem::path image_folder_;
   int num_frames_ = -1;
@@ -134,7 +145,7 @@ class Sequence {
 };
 
 /// Recognises what lies at `path` by looking at it:
-///   video          a file that OpenCV can open
+///   video          a file that FFmpeg takes for one
 ///   EuRoC ASL      `mav0/cam0/data.csv` below the path, or the path is `mav0` or a `cam*` of it
 ///   KITTI odometry `image_0/` (else `image_2/`) and `times.txt`; or the path is such an `image_*`
 ///   TUM RGB-D      `rgb.txt`
@@ -142,10 +153,11 @@ class Sequence {
 /// Timestamps come from the data set's list, or the names in an image folder, where each is seconds
 /// (EuRoC: ns; in names with a point) or the ms, us or ns since 1970 of a date in this century,
 /// else from `fps`, and images are ordered by time or, digits counting as numbers, by name. A video
-/// keeps its own timestamps where its first frames have increasing ones.
+/// has its own timestamps; those of a bare stream of frames are made up, and it is said.
 ///
 /// Images are taken as stored, whatever orientation their EXIF data ask for (a phone changes its
-/// mind in mid-sequence when it looks up or down); videos are turned upright as players do.
+/// mind in mid-sequence when it looks up or down); videos are turned upright as players do, by
+/// their display matrix.
 /// 16-bit images are scaled to 8 bits, transparency is dropped.
 ///
 /// Throws std::invalid_argument when options.Problem(); std::runtime_error, with path and reason in

@@ -25,7 +25,7 @@ bool IsNoVideoName(const fs::path& file) {
 SequenceForm SequenceFormVideo() {
   SequenceForm form;
   form.name = "video";
-  form.description = "a file that OpenCV can open";
+  form.description = "a file that FFmpeg can open";
   form.rank = 100;
   form.recognises = [](const fs::path& path) {
     return IsFile(path) && !IsImageName(path) && !IsNoVideoName(path);
