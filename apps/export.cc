@@ -178,7 +178,8 @@ int Export(const ExportFlags& flags) {
   job.common = flags.common;
   if (job.map.is_video && flags.images.empty()) {
     progress.Warn("the images are frames of " + job.map.image_folder +
-                  ": extract them as %06d.png, counted from 0, and name their folder by --images");
+                  ": extract them, ffmpeg -i VIDEO -fps_mode passthrough -start_number 0 %06d.png, "
+                  "and name their folder by --images");
   }
   MakeParent(job.out);
   format.write(job);

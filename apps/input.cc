@@ -4,9 +4,12 @@
 #include <stdexcept>
 
 #include "apps/focal_guess.h"
+#include "apps/input_lines.h"
+#include "rotodom/camera/camera_form.h"
 #include "rotodom/camera/camera_form.h"
 #include "rotodom/camera/read_camera.h"
 #include "rotodom/loop/vocabulary_file.h"
+#include "rotodom/sequence/sequence_form.h"
 
 namespace rotslam {
 
@@ -25,7 +28,7 @@ void AddInputFlags(CLI::App& command, InputFlags& flags) {
   command
       .add_option("sequence",
                   flags.sequence,
-                  "Image folder, KITTI odometry, TUM RGB-D or EuRoC sequence, or video file")
+                  "Folder of images, video or recording; known are " + SequenceFormNames())
       ->required();
   command.add_option("--camera",
                      flags.camera,
@@ -95,7 +98,7 @@ Input OpenInput(const InputFlags& flags,
   Input input;
   input.path = std::filesystem::absolute(flags.sequence).lexically_normal().string();
   input.sequence = OpenSequence(flags.sequence, options);
-  tell("input:  " + input.sequence->Describe());
+  for (const std::string& line : DescribeSequence(*input.sequence)) tell(line);
   if (flags.focal_guess) {
     const cv::Size size = input.sequence->image_size();
     input.guess = GuessFocal(flags.sequence, options, size);
@@ -107,8 +110,7 @@ Input OpenInput(const InputFlags& flags,
     input.given_rotations = ReadOrientations(flags.rotations);
     input.rotations_file = flags.rotations;
   }
-  tell("camera: " + Describe(input.camera) + " (" + (input.guess ? "guessed" : input.camera_file) +
-       ")");
+  for (const std::string& line : DescribeCamera(input)) tell(line);
   if (input.sequence->NumFrames() >= 0 && input.sequence->NumFrames() < 3) {
     throw std::runtime_error(flags.sequence + ": " + std::to_string(input.sequence->NumFrames()) +
                              " frames after --first, --last and --stride; at least 3 are needed");

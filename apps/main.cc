@@ -1,5 +1,4 @@
 #include <csignal>
-#include <cstdlib>
 #include <exception>
 #include <string>
 
@@ -54,9 +53,6 @@ int main(int argc, char** argv) {
     CLI::App app("rotslam: camera path and sparse map from one calibrated video, rotations first",
                  "rotslam");
     app.require_subcommand(1);
-    // FFmpeg writes to stderr by itself what we report in our own words; -8 is its "quiet".
-    // No thread runs yet.
-    setenv("OPENCV_FFMPEG_LOGLEVEL", "-8", 0);  // NOLINT(concurrency-mt-unsafe)
     rotslam::KeepFreedMemory();
     // A file beyond a limit on sizes is a disk that is full: an error of the write, not the end.
     std::signal(SIGXFSZ, SIG_IGN);

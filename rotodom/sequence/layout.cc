@@ -57,7 +57,13 @@ void NoteGaps(Layout& layout) {
 
 const SequenceForm& FindSequenceForm(const fs::path& given) {
   std::error_code error;
-  if (!fs::exists(ParseBagReference(given).file, error)) Fail(given, "no such file or folder");
+  if (!fs::exists(ParseBagReference(given).file, error)) {
+    if (given.filename().string().find_first_of("%*?") != std::string::npos) {
+      const fs::path folder = given.has_parent_path() ? given.parent_path() : fs::path(".");
+      Fail(given, "is a pattern of names; give the folder, " + folder.string());
+    }
+    Fail(given, "no such file or folder");
+  }
   const fs::path path = CleanPath(given);
   const SequenceForm* best = nullptr;
   for (const SequenceForm& form : SequenceForms()) {
@@ -67,6 +73,23 @@ const SequenceForm& FindSequenceForm(const fs::path& given) {
   if (best != nullptr) return *best;
   if (IsImageName(path)) Fail(path, "is a single image; give the folder that holds the images");
   Fail(path, "is no video; give the folder of the data set");
+}
+
+std::string SequenceFormNames() {
+  std::string names;
+  for (const SequenceForm& form : SequenceForms()) {
+    names += (names.empty() ? "" : ", ") + form.name;
+  }
+  return names;
+}
+
+bool IsSequence(const fs::path& given) {
+  std::error_code error;
+  if (!fs::exists(ParseBagReference(given).file, error)) return false;
+  const fs::path path = CleanPath(given);
+  return std::any_of(SequenceForms().begin(),
+                     SequenceForms().end(),
+                     [&](const SequenceForm& form) { return form.recognises(path); });
 }
 
 Layout FindLayout(const fs::path& path, const SequenceOptions& options) {

@@ -50,7 +50,7 @@ struct Frame {
   std::string problem;       // why the image is empty, in one line; empty when it is not
 };
 
-/// The frames of one input, in order, each once. Made by OpenSequence. Images of a folder are
+/// The frames of one input, in order, each once. Made by OpenSequence. Images are
 /// decoded one ahead, on a thread of their own.
 class Sequence {
  public:

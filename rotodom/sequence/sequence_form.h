@@ -28,6 +28,12 @@ struct SequenceForm {
 /// All forms, by the names of their sources.
 const std::vector<SequenceForm>& SequenceForms();
 
+/// The names of all forms, separated by commas.
+std::string SequenceFormNames();
+
+/// Is there a form that reads `path`? Looks at names only.
+bool IsSequence(const std::filesystem::path& path);
+
 /// The form that reads `path`. Throws std::runtime_error, with path and reason in one line, when
 /// nothing is there or no form recognises it.
 const SequenceForm& FindSequenceForm(const std::filesystem::path& path);

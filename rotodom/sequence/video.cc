@@ -2,8 +2,9 @@
 
 #include <algorithm>
 #include <cstddef>
-#include <cstdint>
+#include <future>
 #include <iomanip>
+#include <optional>
 #include <sstream>
 #include <stdexcept>
 #include <utility>
@@ -38,57 +39,86 @@ class VideoSequence : public Sequence {
   }
 
   void Skip(int count) override {
-    for (int k = 0; k < count && Advance(); ++k) timestamps_s_.push_back(file_.time_s());
+    if (count > 0 && ahead_.valid()) {
+      const std::optional<Ahead> skipped = ahead_.get();
+      if (!skipped) return Finish();
+      timestamps_s_.push_back(skipped->time_s);
+      --count;
+    }
+    for (int k = 0; k < count; ++k) {
+      if (!Advance()) return Finish();
+      timestamps_s_.push_back(file_.time_s());
+    }
   }
 
   std::vector<std::filesystem::path> Files() const override { return {place_}; }
 
  private:
+  // A frame, decoded while the caller works on the one before.
+  struct Ahead {
+    double time_s = 0.0;
+    int number = 0;
+    DecodedImage decoded;
+  };
+
   // Steps to the next frame of the file; false after the last.
   bool Grab() {
-    if (file_.Grab()) {
-      ++number_;
-      return true;
-    }
-    for (std::size_t k = num_file_notes_; k < file_.notes().size(); ++k) {
-      notes_.push_back(file_.notes()[k]);
-    }
-    num_file_notes_ = file_.notes().size();
-    return false;
+    if (!file_.Grab()) return false;
+    ++number_;
+    return true;
   }
 
   // Steps to the next frame to give; false after the last. The first one is there from the start.
   bool Advance() {
-    if (timestamps_s_.empty()) return true;
+    if (std::exchange(is_at_first_, false)) return true;
     const bool beyond_last = options_.last >= 0 && number_ - 1 > options_.last - options_.stride;
     if (ended_ || beyond_last) return false;
     for (int k = 0; k < options_.stride && !ended_; ++k) ended_ = !Grab();
     return !ended_;
   }
 
+  std::optional<Ahead> ReadOne() {
+    if (!Advance()) return std::nullopt;
+    return Ahead{file_.time_s(), number_ - 1, file_.Retrieve()};
+  }
+
+  void Finish() {
+    has_finished_ = true;
+    num_frames_ = static_cast<int>(timestamps_s_.size());
+    for (; num_file_notes_ < file_.notes().size(); ++num_file_notes_) {
+      notes_.push_back(file_.notes()[num_file_notes_]);
+    }
+  }
+
   std::optional<Frame> Decode() override {
-    if (!Advance()) {
-      num_frames_ = static_cast<int>(timestamps_s_.size());
+    if (has_finished_) return std::nullopt;
+    std::optional<Ahead> read = ahead_.valid() ? ahead_.get() : ReadOne();
+    if (!read) {
+      Finish();
       return std::nullopt;
     }
+    ahead_ = std::async(std::launch::async, [this] { return ReadOne(); });
     Frame frame;
     frame.id = FrameId{static_cast<int>(timestamps_s_.size())};
-    frame.timestamp_s = file_.time_s();
+    frame.timestamp_s = read->time_s;
     std::ostringstream name;
-    name << std::setw(6) << std::setfill('0') << number_ - 1;
+    name << std::setw(6) << std::setfill('0') << read->number;
     frame.name = name.str();
-    timestamps_s_.push_back(frame.timestamp_s);
-    DecodedImage decoded = file_.Retrieve();
-    frame.image = std::move(decoded.image);
-    frame.problem = std::move(decoded.problem);
+    timestamps_s_.push_back(read->time_s);
+    frame.image = std::move(read->decoded.image);
+    frame.problem = std::move(read->decoded.problem);
     return frame;
   }
 
   SequenceOptions options_;
   VideoFile file_;
   std::size_t num_file_notes_ = file_.notes().size();  // those that are among notes_
-  bool ended_ = false;
-  int number_ = 0;  // frames of the file grabbed so far
+  bool is_at_first_ = true;
+  bool ended_ = false;         // the file has no more frames
+  bool has_finished_ = false;  // and the caller knows
+  int number_ = 0;             // frames of the file grabbed so far
+  // Touches all that is above; last, so that it is waited for first.
+  std::future<std::optional<Ahead>> ahead_;
 };
 
 }  // namespace

@@ -13,7 +13,6 @@
 #include <stdexcept>
 #include <string_view>
 #include <system_error>
-#include <thread>
 #include <utility>
 
 extern "C" {
@@ -47,6 +46,9 @@ constexpr std::int64_t kNoTime = AV_NOPTS_VALUE;
 constexpr const char* kContainers =
     "mov,mp4,m4a,3gp,3g2,mj2,matroska,webm,avi,mpegts,mpeg,flv,asf,gif,apng,ogg,mxf,mxf_opatom,ivf,"
     "nut,dv,rm,wtv,gxf,yuv4mpegpipe,h264,hevc,vvc,m4v,mjpeg,mpegvideo,vc1,obu,av1";
+
+// Those of them that are frames and no container around: FFmpeg numbers some at 25 a second.
+constexpr const char* kBareStreams = "h264,hevc,vvc,m4v,mjpeg,mpegvideo,vc1,obu,av1";
 
 // What FFmpeg calls its containers and codecs, and what people call them.
 constexpr std::array<std::pair<std::string_view, const char*>, 22> kPlainNames = {{
@@ -171,22 +173,47 @@ FfmpegPointer<AVFormatContext> NewContainer() {
   return container;
 }
 
+// The container of a file, by its bytes and, where these are not sure, its name; nullptr: none.
+struct ProbedFormat {
+  const AVInputFormat* format = nullptr;
+  bool is_sure = false;  // it is not the name alone that says so
+  int error = 0;
+};
+
+ProbedFormat ProbeFormat(const fs::path& path, const std::string& url) {
+  ProbedFormat probed;
+  AVIOContext* file = nullptr;
+  probed.error = avio_open2(&file, url.c_str(), AVIO_FLAG_READ, nullptr, nullptr);
+  if (probed.error < 0) return probed;
+  const int score = av_probe_input_buffer2(file, &probed.format, path.c_str(), nullptr, 0, 0);
+  avio_closep(&file);
+  if (score < 0) {
+    probed.error = score;
+    probed.format = nullptr;
+    return probed;
+  }
+  probed.is_sure = score > AVPROBE_SCORE_EXTENSION;
+  // A row of JPEG files looks like a single one.
+  const std::string extension = path.extension().string();
+  const bool is_row = extension == ".mjpeg" || extension == ".mjpg" || extension == ".MJPG";
+  if (is_row && IsListed("jpeg_pipe", probed.format->name)) {
+    probed.format = av_find_input_format("mjpeg");
+  }
+  return probed;
+}
+
 // Opens `path`; on failure returns FFmpeg's error and leaves `container` empty.
-// @param format  what the file seems to be, as soon as that is known.
 int OpenInputFile(const fs::path& path,
                   FfmpegPointer<AVFormatContext>& container,
-                  const AVInputFormat*& format) {
+                  ProbedFormat& probed) {
   // With `file:` a colon in the name is no protocol.
   const std::string url = "file:" + path.string();
-  AVIOContext* probed = nullptr;
-  int error = avio_open2(&probed, url.c_str(), AVIO_FLAG_READ, nullptr, nullptr);
-  if (error < 0) return error;
-  error = av_probe_input_buffer2(probed, &format, path.c_str(), nullptr, 0, 0);
-  avio_closep(&probed);
-  if (error < 0) return error;
-  if (!IsListed(kContainers, format->name)) return AVERROR_DEMUXER_NOT_FOUND;
+  probed = ProbeFormat(path, url);
+  if (probed.format == nullptr) return probed.error;
+  if (!IsListed(kContainers, probed.format->name)) return AVERROR_DEMUXER_NOT_FOUND;
   AVFormatContext* raw = NewContainer().release();
-  error = avformat_open_input(&raw, url.c_str(), format, nullptr);  // frees it when it fails
+  // Frees it when it fails.
+  const int error = avformat_open_input(&raw, url.c_str(), probed.format, nullptr);
   container.reset(error < 0 ? nullptr : raw);
   return error;
 }
@@ -194,8 +221,8 @@ int OpenInputFile(const fs::path& path,
 // Frames of the stream by its packets; nothing is decoded.
 std::int64_t CountPackets(const fs::path& path, int stream_index) {
   FfmpegPointer<AVFormatContext> container;
-  const AVInputFormat* format = nullptr;
-  if (OpenInputFile(path, container, format) < 0) return -1;
+  ProbedFormat probed;
+  if (OpenInputFile(path, container, probed) < 0) return -1;
   const FfmpegPointer<AVPacket> packet(av_packet_alloc());
   std::int64_t count = 0;
   for (;;) {
@@ -294,14 +321,14 @@ void VideoFile::Fail(const std::string& reason) const {
 }
 
 void VideoFile::OpenContainer() {
-  const AVInputFormat* format = nullptr;
-  const int error = OpenInputFile(path_, container_, format);
-  if (error == AVERROR_DEMUXER_NOT_FOUND && format != nullptr) {
-    Fail(std::string("not a video but, for FFmpeg, '") + format->name +
+  ProbedFormat probed;
+  const int error = OpenInputFile(path_, container_, probed);
+  if (error == AVERROR_DEMUXER_NOT_FOUND) {
+    Fail(std::string("not a video but, for FFmpeg, '") + probed.format->name +
          "'; give the video file itself, or the folder of the images");
   }
   if (error < 0) {
-    if (format != nullptr && IsMovie(*format)) {
+    if (probed.is_sure && IsMovie(*probed.format)) {
       Fail(
           "an MP4 or QuickTime file without its index (moov), which recorders write last: cut "
           "off or damaged; copy it once more from the camera");
@@ -354,10 +381,9 @@ void VideoFile::OpenDecoder(int num_threads) {
     Fail("video without a readable frame: the parameters of " + name + " are damaged");
   }
   codec_->pkt_timebase = stream_->time_base;
-  constexpr unsigned kMostThreads = 16;
-  const unsigned num_cores = std::max(1u, std::thread::hardware_concurrency());
-  codec_->thread_count =
-      num_threads > 0 ? num_threads : static_cast<int>(std::min(num_cores, kMostThreads));
+  // What several threads make of a damaged frame, and of those that refer to it, differs from time
+  // to time.
+  codec_->thread_count = num_threads;
   // What a damaged header may ask for: no more than 16K video, and no more than the file is worth.
   // 4K video of one colour comes to some 2,800 pixels a byte.
   constexpr std::int64_t kMostPixels = std::int64_t{1} << 27;
@@ -376,7 +402,8 @@ void VideoFile::OpenDecoder(int num_threads) {
 // Are there timestamps, and do they tell frames apart? Packets tell, before any is decoded.
 void VideoFile::ProbeTimestamps() {
   constexpr std::size_t kProbed = 16;
-  if ((container_->iformat->flags & AVFMT_NOTIMESTAMPS) != 0) {
+  const AVInputFormat& format = *container_->iformat;
+  if (IsListed(kBareStreams, format.name) || (format.flags & AVFMT_NOTIMESTAMPS) != 0) {
     has_timestamps_ = false;
     return;
   }
@@ -506,7 +533,8 @@ void VideoFile::DecodeFirstFrame() {
       const double angle = -av_display_rotation_get(matrix->data());
       notes_.push_back(
           std::isfinite(angle)
-              ? "the display matrix turns pictures by " + NumberText(angle) +
+              ? "the display matrix turns pictures by " +
+                    NumberText(std::round(10.0 * angle) / 10.0) +
                     " degrees, which is no right angle: they are taken as stored"
               : std::string("the display matrix is singular: pictures are taken as stored"));
     }
@@ -626,7 +654,8 @@ void VideoFile::SetTime(std::int64_t ticks) {
     }
     suspect_s_ = own_s;
   }
-  ++num_without_time_;
+  // An AVI file numbers packets, not frames: the last ones of a decoder that reorders have none.
+  if (ticks != kNoTime || !is_drained_) ++num_without_time_;
   time_s_ = is_first ? 0.0 : time_s_ + 1.0 / rate_;
 }
 

@@ -1,6 +1,7 @@
 // Layouts of sequences and their images.
 
 #include <algorithm>
+#include <limits>
 #include <stdexcept>
 
 #include "rotodom/sequence/layout.h"
@@ -123,6 +124,22 @@ const RegisterFuzzTarget image("image", [](std::string_view bytes, const Tempora
     ++count;
   }
   if (count != 3) throw std::logic_error("a frame is lost");
+});
+
+// A film that may be damaged: frames in the order of time, each a picture or a problem.
+const RegisterFuzzTarget video("video", [](std::string_view bytes, const TemporaryFolder& folder) {
+  folder.Write("film.mp4", std::string(bytes));
+  const auto sequence = OpenSequence(folder.path() / "film.mp4", {});
+  const std::size_t limit = 10 * bytes.size() + 10;
+  double time_s = -std::numeric_limits<double>::infinity();
+  std::size_t count = 0;
+  for (; const auto frame = sequence->Next(); ++count) {
+    if (frame->image.empty() == frame->problem.empty()) throw std::logic_error("a wrong frame");
+    if (!(frame->timestamp_s > time_s)) throw std::logic_error("a wrong time");
+    time_s = frame->timestamp_s;
+    if (count > limit) throw std::logic_error("frames without end");
+  }
+  if (sequence->NumFrames() != static_cast<int>(count)) throw std::logic_error("a wrong count");
 });
 
 }  // namespace
