@@ -114,6 +114,8 @@ int Average(const AverageFlags& flags) {
   cam_from_world.insert(list.cam_from_world.begin(), list.cam_from_world.end());
   WriteRotationList(flags.out, list, cam_from_world);
   if (flags.common.quiet) return 0;
+  PrintRow("form", list.form, "");
+  for (const std::string& note : list.notes) std::printf("note: %s\n", note.c_str());
   PrintResult(result, read_s, average_s);
   if (flags.certify) PrintCertificate(list, result, options);
   return 0;

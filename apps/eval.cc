@@ -9,6 +9,7 @@
 #include "apps/config.h"
 #include "apps/evaluation.h"
 #include "output/metrics.h"
+#include "output/trajectory_form.h"
 
 namespace rotslam {
 namespace {
@@ -20,6 +21,9 @@ struct EvalFlags {
   std::string times;
   int num_images = 0;
   std::optional<double> max_gap_s;
+  double time_offset_s = 0.0;
+  bool align_axes = false;
+  bool as_is = false;
   bool json = false;
 };
 
@@ -54,19 +58,32 @@ void PrintTable(const TrajectoryMetrics& metrics, int num_images) {
   PrintRow("path length", Fixed(metrics.path_length_m, 2), "m, ground truth");
 }
 
+std::string TrajectoryFormNames() {
+  std::string names;
+  for (const TrajectoryForm& form : TrajectoryForms()) {
+    names += (names.empty() ? "" : ", ") + form.name;
+  }
+  return names;
+}
+
 int Eval(const EvalFlags& flags) {
-  MetricsOptions options;
-  options.num_threads = flags.common.NumThreads();
-  if (!flags.common.config.empty()) LoadOptionsYaml(flags.common.config, options);
-  if (flags.max_gap_s) options.max_gap_s = *flags.max_gap_s;
+  MatchOptions options;
+  options.metrics.num_threads = flags.common.NumThreads();
+  if (!flags.common.config.empty()) LoadOptionsYaml(flags.common.config, options.metrics);
+  if (flags.max_gap_s) options.metrics.max_gap_s = *flags.max_gap_s;
+  options.align_axes = flags.align_axes;
+  options.as_is = flags.as_is;
+  options.time_offset_s = flags.time_offset_s;
   std::optional<std::filesystem::path> times;
   if (!flags.times.empty()) times = flags.times;
-  const TrajectoryMetrics metrics =
+  const Comparison comparison =
       CompareTrajectoryFiles(flags.ground_truth, flags.estimate, times, options);
   if (flags.json) {
-    std::printf("%s\n", MetricsJson(metrics, flags.num_images).dump().c_str());
+    std::printf("%s\n", MetricsJson(comparison, flags.num_images)
+                           .dump(-1, ' ', false, nlohmann::json::error_handler_t::replace).c_str());
   } else {
-    PrintTable(metrics, flags.num_images);
+    for (const std::string& note : comparison.notes) std::printf("note: %s\n", note.c_str());
+    PrintTable(comparison.metrics, flags.num_images);
   }
   return 0;
 }
@@ -76,12 +93,12 @@ int Eval(const EvalFlags& flags) {
 void AddEvalCommand(CLI::App& app, Action& action) {
   const auto flags = std::make_shared<EvalFlags>();
   CLI::App* command = app.add_subcommand(
-      "eval", "Compare a trajectory with the ground truth (TUM and KITTI files in any mix)");
-  command->add_option("ground_truth", flags->ground_truth, "Ground truth, camera->world")
+      "eval", "Compare a trajectory with the ground truth (TUM, KITTI, EuRoC and others in any mix)");
+  command->add_option("ground_truth", flags->ground_truth, "Ground truth, camera->world: " + TrajectoryFormNames())
       ->required();
   command->add_option("estimate", flags->estimate, "Estimate, camera->world")->required();
   command->add_option(
-      "--times", flags->times, "Timestamps of KITTI files, one a line (default: the pose number)");
+      "--times", flags->times, "Timestamps of files without times, one a line (default: the pose number)");
   command
       ->add_option("--images", flags->num_images, "Images of the sequence, to report the coverage")
       ->check(AtLeastZero());
@@ -90,6 +107,15 @@ void AddEvalCommand(CLI::App& app, Action& action) {
                    flags->max_gap_s,
                    "Largest gap in the ground truth to interpolate over, s (default: 0.2)")
       ->check(AtLeastZero());
+  command->add_flag("--align-axes",
+                    flags->align_axes,
+                    "Take out a constant rotation between the axes (body and camera, say)");
+  command->add_flag("--as-is",
+                    flags->as_is,
+                    "Take both files as they stand, even if one fits far better as world->camera "
+                    "or with qw first");
+  command->add_option(
+      "--time-offset", flags->time_offset_s, "Added to the times of the estimate, s (default: 0)");
   command->add_flag("--json", flags->json, "Print one line of JSON");
   AddCommonFlags(*command, flags->common);
   command->footer("Example: rotslam eval groundtruth.txt runs/mine/trajectory_tum.txt");

@@ -3,34 +3,40 @@
 #include <filesystem>
 #include <optional>
 #include <string>
+#include <vector>
 
 #include <nlohmann/json_fwd.hpp>
 
 #include "output/metrics.h"
-#include "rotodom/types/trajectory.h"
+#include "output/trajectory_match.h"
 
 namespace rotslam {
 
-/// How far `estimate` is from `ground_truth`; their names are for the message.
+/// How far an estimate is from the truth, and what was assumed about the two.
+struct Comparison {
+  TrajectoryMetrics metrics;
+  std::vector<std::string> notes;  // one line each
+};
+
+/// How far `estimate` is from `ground_truth` once MatchTrajectories has brought them together.
 /// Throws std::runtime_error, in one line, when fewer than three poses have ground truth.
-TrajectoryMetrics CompareTrajectories(const Trajectory& ground_truth,
-                                      const std::string& ground_truth_name,
-                                      const Trajectory& estimate,
-                                      const std::string& estimate_name,
-                                      const MetricsOptions& options);
+Comparison CompareTrajectories(const NamedTrajectory& ground_truth,
+                               const NamedTrajectory& estimate,
+                               const MatchOptions& options);
 
 /// The same for two files.
-/// @param times  timestamps of KITTI files, as in ReadTrajectory.
-/// Throws what ReadTrajectory throws besides.
-TrajectoryMetrics CompareTrajectoryFiles(const std::filesystem::path& ground_truth,
-                                         const std::filesystem::path& estimate,
-                                         const std::optional<std::filesystem::path>& times,
-                                         const MetricsOptions& options);
+/// @param times  timestamps of files that have none, as in ReadTrajectoryFile.
+/// Throws what ReadTrajectoryFile throws besides.
+Comparison CompareTrajectoryFiles(const std::filesystem::path& ground_truth,
+                                  const std::filesystem::path& estimate,
+                                  const std::optional<std::filesystem::path>& times,
+                                  const MatchOptions& options);
 
 /// Share of the images whose estimated pose has ground truth, to four decimals; nullopt for none.
 std::optional<double> Coverage(const TrajectoryMetrics& metrics, int num_images);
 
-/// What `rotslam eval --json` prints; null where a metric is not defined.
-nlohmann::ordered_json MetricsJson(const TrajectoryMetrics& metrics, int num_images);
+/// What `rotslam eval --json` prints; null where a metric is not defined, "notes" only where there
+/// are any.
+nlohmann::ordered_json MetricsJson(const Comparison& comparison, int num_images);
 
 }  // namespace rotslam

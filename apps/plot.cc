@@ -40,6 +40,9 @@ int WritePlots(const PlotFlags& flags) {
   if (!run.truth_problem.empty()) {
     std::printf("no comparison with the ground truth: %s\n", run.truth_problem.c_str());
   }
+  if (run.truth) {
+    for (const std::string& note : run.truth->notes) std::printf("note: %s\n", note.c_str());
+  }
   if (!run.HasPositions()) std::printf("the run has no positions, so there is no trajectory\n");
   std::printf("wrote %s: %s, each as SVG and PNG\n", out.c_str(), names.c_str());
   return 0;

@@ -36,6 +36,9 @@ int WriteReport(const ReportFlags& flags) {
   const std::string page = ReportPage(run, flags.report);
   ReplaceFile(out, page);
   if (!flags.common.quiet) {
+    if (run.truth) {
+      for (const std::string& note : run.truth->notes) std::printf("note: %s\n", note.c_str());
+    }
     std::printf("wrote %s, %.1f MB\n", out.c_str(), 1e-6 * static_cast<double>(page.size()));
   }
   return 0;
@@ -60,10 +63,13 @@ void WriteReportOfRun(const std::filesystem::path& directory,
 void AddTruthFlags(CLI::App& command, TruthSource& truth) {
   command.add_option("--ground-truth",
                      truth.file,
-                     "TUM or KITTI file, camera->world (default: the one beside the images)");
+                     "File or folder of poses, camera->world (default: the one beside the images)");
   command.add_option("--times",
                      truth.times,
-                     "Timestamps of a KITTI file, one a line (default: times.txt beside it)");
+                     "Timestamps of a file without times, one a line (default: times.txt beside it)");
+  command.add_flag("--align-axes",
+                   truth.align_axes,
+                   "Take out a constant rotation between its axes and the camera's");
 }
 
 void AddReportFlag(CLI::App& command, bool& use_report) {

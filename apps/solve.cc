@@ -1,8 +1,8 @@
 #include <algorithm>
+#include <charconv>
 #include <chrono>
-#include <cstdint>
+#include <cstdio>
 #include <filesystem>
-#include <limits>
 #include <map>
 #include <memory>
 #include <set>
@@ -46,6 +46,11 @@ struct SolveFlags {
 std::size_t TakeRelativeRotations(const SolveFlags& flags, KnownRotationInput& input) {
   constexpr double kSigmaDeg = 1.0;  // of edges that say none, as `average` has it
   const RotationList list = ReadRotationList(flags.relative_rotations, kSigmaDeg * kRadFromDeg);
+  if (!flags.common.quiet) {
+    for (const std::string& note : list.notes) {
+      std::printf("note: %s: %s\n", flags.relative_rotations.c_str(), note.c_str());
+    }
+  }
   GlobalAveragingOptions options;
   options.seed = flags.common.seed;
   GlobalAveragingProblem problem;
@@ -56,9 +61,10 @@ std::size_t TakeRelativeRotations(const SolveFlags& flags, KnownRotationInput& i
 
   std::vector<RotationMap> pieces(averaged.component_sizes.size());
   for (const auto& [view, cam_from_world] : averaged.cam_from_world) {
-    const std::uint64_t id = list.ids[view.value];
-    if (id > static_cast<std::uint64_t>(std::numeric_limits<int>::max())) continue;
-    const FrameId frame{static_cast<int>(id)};
+    const std::string& id = list.ids[view.value];
+    FrameId frame;
+    const auto [stop, code] = std::from_chars(id.data(), id.data() + id.size(), frame.value);
+    if (code != std::errc() || stop != id.data() + id.size()) continue;
     if (!input.cam_from_world.contains(frame)) continue;
     pieces[averaged.component.at(view)][frame] = cam_from_world;
   }

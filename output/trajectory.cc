@@ -1,43 +1,16 @@
 #include "output/trajectory.h"
 
-#include <algorithm>
 #include <cmath>
 #include <stdexcept>
 #include <string>
 #include <vector>
 
 #include "output/atomic_file.h"
+#include "output/trajectory_form.h"
 #include "rotodom/types/text_file.h"
 
 namespace rotslam {
 namespace {
-
-constexpr std::size_t kTumColumns = 8;
-constexpr std::size_t kKittiColumns = 12;
-
-std::vector<double> Numbers(const std::filesystem::path& path, const TextRow& row) {
-  std::vector<double> numbers;
-  for (std::size_t k = 0; k < row.words.size(); ++k) numbers.push_back(NumberAt(path, row, k));
-  return numbers;
-}
-
-StampedPose ParseTumPose(const std::vector<double>& v) {
-  return {v[0],
-          Rotation(Eigen::Quaterniond(v[7], v[4], v[5], v[6])),
-          Eigen::Vector3d(v[1], v[2], v[3])};
-}
-
-StampedPose ParseKittiPose(const std::vector<double>& v, double timestamp_s) {
-  Eigen::Matrix3d R_w_c;
-  R_w_c << v[0], v[1], v[2], v[4], v[5], v[6], v[8], v[9], v[10];
-  return {timestamp_s, Rotation::FromMatrix(R_w_c), Eigen::Vector3d(v[3], v[7], v[11])};
-}
-
-std::vector<double> ReadTimes(const std::filesystem::path& path) {
-  std::vector<double> times;
-  for (const TextRow& row : ReadTextRows(path)) times.push_back(NumberAt(path, row, 0));
-  return times;
-}
 
 void RequireFinite(const Trajectory& trajectory) {
   for (std::size_t k = 0; k < trajectory.size(); ++k) {
@@ -60,50 +33,45 @@ std::optional<std::filesystem::path> TimesBeside(const std::filesystem::path& tr
   return times;
 }
 
+TrajectoryFile ReadTrajectoryFile(const std::filesystem::path& path,
+                                  const std::optional<std::filesystem::path>& times) {
+  const TrajectoryInput input = ReadTrajectoryInput(path);
+  if (!input.is_folder && input.rows.empty()) {
+    throw std::runtime_error(path.string() + ": has no poses");
+  }
+  if (!input.odd_word.empty()) {
+    throw std::runtime_error(AtLine(path,
+                                    input.rows.front().line,
+                                    "expected a finite number, found \"" + input.odd_word + "\""));
+  }
+  for (const TrajectoryForm& form : TrajectoryForms()) {
+    if (form.recognises(input)) return form.read(input, times);
+  }
+  if (input.is_folder) {
+    throw std::runtime_error(path.string() +
+                             ": is a folder without pose files: expected 4x4 matrices in "
+                             "frame-000000.pose.txt or 0.txt, or a data.csv");
+  }
+  throw std::runtime_error(
+      AtLine(path,
+             input.rows.front().line,
+             "expected 8 columns (TUM) or 12 (KITTI), 7, 9, 13, 16 or 17 of other forms, or a "
+             "header that names timestamp, qx, qy, qz and qw; found " +
+                 std::to_string(input.NumColumns())));
+}
+
 Trajectory ReadTrajectory(const std::filesystem::path& path,
                           const std::optional<std::filesystem::path>& times) {
-  const std::vector<TextRow> rows = ReadTextRows(path);
-  if (rows.empty()) throw std::runtime_error(path.string() + ": has no poses");
-  const std::size_t num_columns = rows.front().words.size();
-  if (num_columns != kTumColumns && num_columns != kKittiColumns) {
-    throw std::runtime_error(
-        AtLine(path,
-               rows.front().line,
-               "expected 8 columns (TUM) or 12 (KITTI), found " + std::to_string(num_columns)));
+  return ReadTrajectoryFile(path, times).poses;
+}
+
+std::optional<std::string> RecogniseTrajectory(const std::filesystem::path& path) {
+  const TrajectoryInput input = ReadTrajectoryInput(path);
+  if (!input.odd_word.empty() || (!input.is_folder && input.rows.empty())) return std::nullopt;
+  for (const TrajectoryForm& form : TrajectoryForms()) {
+    if (form.recognises(input)) return form.name;
   }
-  const bool is_kitti = num_columns == kKittiColumns;
-  std::vector<double> timestamps_s;
-  if (is_kitti && times) {
-    timestamps_s = ReadTimes(*times);
-    if (timestamps_s.size() < rows.size()) {
-      throw std::runtime_error(times->string() + ": has " + std::to_string(timestamps_s.size()) +
-                               " timestamps for the " + std::to_string(rows.size()) + " poses of " +
-                               path.string());
-    }
-  }
-  Trajectory trajectory;
-  trajectory.reserve(rows.size());
-  for (std::size_t k = 0; k < rows.size(); ++k) {
-    if (rows[k].words.size() != num_columns) {
-      throw std::runtime_error(AtLine(path,
-                                      rows[k].line,
-                                      "expected " + std::to_string(num_columns) +
-                                          " columns, found " +
-                                          std::to_string(rows[k].words.size())));
-    }
-    const std::vector<double> numbers = Numbers(path, rows[k]);
-    const double timestamp_s = timestamps_s.empty() ? static_cast<double>(k) : timestamps_s[k];
-    try {
-      trajectory.push_back(is_kitti ? ParseKittiPose(numbers, timestamp_s) : ParseTumPose(numbers));
-    } catch (const std::invalid_argument& error) {
-      throw std::runtime_error(AtLine(path, rows[k].line, error.what()));
-    }
-  }
-  std::stable_sort(
-      trajectory.begin(), trajectory.end(), [](const StampedPose& a, const StampedPose& b) {
-        return a.timestamp_s < b.timestamp_s;
-      });
-  return trajectory;
+  return std::nullopt;
 }
 
 void WriteTumTrajectory(const std::filesystem::path& path,

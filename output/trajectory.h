@@ -9,17 +9,37 @@
 
 namespace rotslam {
 
-/// Reads a trajectory; poses come back in ascending time, equal times in file order.
+/// What a file of poses says.
+struct TrajectoryFile {
+  Trajectory poses;                // ascending in time, no time twice
+  std::string form;                // the form that it was taken for: "TUM"
+  std::vector<std::string> notes;  // what was assumed or left out, one line each
+  bool has_times = true;           // else a pose has its number for a time
+  // Nothing in the file says that qw is last, or first: other files may tell, see
+  // output/trajectory_match.h.
+  bool is_order_assumed = false;
+};
+
+/// Reads a trajectory, camera->world, in any of the forms of output/trajectory_form.h: TUM, KITTI,
+/// EuRoC and others, or a folder with a file per pose. Blanks, commas or semicolons separate the
+/// columns, '#' starts a comment, a line of words names the columns.
 ///
-/// The number of columns tells the format, blanks or commas separate them, '#' starts a comment:
-///   8   TUM:   timestamp tx ty tz qx qy qz qw, camera->world;
-///   12  KITTI: the row-major 3x4 matrix [R t], camera->world.
-/// @param times  for KITTI files: one timestamp in seconds per pose, extra ones are ignored.
-///               Without it pose k has the timestamp k. TUM files have their own.
-/// Throws std::runtime_error with file, line and reason: no poses, another number of columns, a
-/// number that is not finite, a quaternion or matrix that is not a rotation, too few times.
+/// Poses that a system has marked as lost (nan, a zero quaternion or matrix) and a time that is
+/// there again are left out; the notes count them.
+/// @param times  for files without times: one timestamp per pose, extra ones are ignored. Without
+///               it pose k has the timestamp k.
+/// Throws std::runtime_error with file, line and reason: no poses, columns of no known form, a
+/// quaternion or matrix that is not a rotation, too few times.
+TrajectoryFile ReadTrajectoryFile(const std::filesystem::path& path,
+                                  const std::optional<std::filesystem::path>& times = std::nullopt);
+
+/// The poses alone.
 Trajectory ReadTrajectory(const std::filesystem::path& path,
                           const std::optional<std::filesystem::path>& times = std::nullopt);
+
+/// Name of the form that a file would be read in; nullopt when it is no trajectory.
+/// Throws std::runtime_error when it cannot be read at all.
+std::optional<std::string> RecogniseTrajectory(const std::filesystem::path& path);
 
 /// Timestamps of a KITTI file where none are named: times.txt in the same folder, if it is there.
 std::optional<std::filesystem::path> TimesBeside(const std::filesystem::path& trajectory);

@@ -58,8 +58,8 @@ void AddMetrics(const BatchEntry& entry,
                 const fs::path& directory,
                 int num_threads,
                 BatchResult& result) {
-  MetricsOptions options;
-  options.num_threads = num_threads;
+  MatchOptions options;
+  options.metrics.num_threads = num_threads;
   try {
     const std::optional<fs::path> truth =
         entry.ground_truth.empty()
@@ -68,8 +68,10 @@ void AddMetrics(const BatchEntry& entry,
     if (!truth) return;
     const std::optional<fs::path> times =
         entry.times.empty() ? TimesBeside(*truth) : std::optional<fs::path>(entry.times);
-    const TrajectoryMetrics metrics =
+    const Comparison comparison =
         CompareTrajectoryFiles(*truth, EstimateOf(entry, directory), times, options);
+    const TrajectoryMetrics& metrics = comparison.metrics;
+    if (result.note.empty() && !comparison.notes.empty()) result.note = comparison.notes.back();
     result.coverage = Coverage(metrics, static_cast<int>(result.frames.value_or(0)));
     result.rpe1_deg = metrics.rpe1_deg;
     result.rpen_deg = metrics.rpen_deg;

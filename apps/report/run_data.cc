@@ -12,6 +12,7 @@
 #include "apps/run_summary.h"
 #include "output/g2o.h"
 #include "output/trajectory.h"
+#include "output/trajectory_match.h"
 #include "rotodom/sequence/sequence.h"
 
 namespace rotslam {
@@ -40,9 +41,9 @@ Trajectory RotationsOnly(const std::vector<RotationRow>& rows) {
 }
 
 // KITTI's poses carry no times: those that lie beside them, else the numbers of the frames.
-Trajectory ReadTruth(const TruthSource& source, const fs::path& file) {
-  if (!source.times.empty()) return ReadTrajectory(file, source.times);
-  return ReadTrajectory(file, TimesBeside(file));
+TrajectoryFile ReadTruth(const TruthSource& source, const fs::path& file) {
+  if (!source.times.empty()) return ReadTrajectoryFile(file, source.times);
+  return ReadTrajectoryFile(file, TimesBeside(file));
 }
 
 // The place of each pair's estimate among the frames; both ascend in time.
@@ -89,18 +90,23 @@ Rotation BestTurn(const std::vector<PosePair>& pairs) {
   return Rotation::FromMatrix(svd.matrixU() * sign * svd.matrixV().transpose());
 }
 
-TruthData CompareWith(const Trajectory& ground_truth,
-                      const std::string& file,
+TruthData CompareWith(const TruthSource& source,
+                      const fs::path& file,
                       const MetricsOptions& options,
                       const RunData& run) {
   const Trajectory orientations = RotationsOnly(run.rotations);
-  const std::vector<PosePair> pairs = AssociatePoses(ground_truth, orientations, options);
-  if (pairs.size() < 3) {
-    throw std::runtime_error(file + ": only " + std::to_string(pairs.size()) +
-                             " frames have ground truth in it: do the timestamps agree?");
-  }
+  MatchOptions matching;
+  matching.metrics = options;
+  matching.align_axes = source.align_axes;
+  const MatchedTrajectories matched =
+      MatchTrajectories({ReadTruth(source, file), file.string()},
+                        {{orientations, "rotations.csv", {}, true, false}, "the run"},
+                        matching);
+  const Trajectory& ground_truth = matched.ground_truth;
+  const std::vector<PosePair>& pairs = matched.pairs;
   TruthData truth;
-  truth.file = file;
+  truth.file = file.string();
+  truth.notes = matched.notes;
   truth.rotations = ComputeMetrics(pairs, options);
   truth.frames = PlacesOf(pairs, orientations);
   const Rotation estimate_from_truth = BestTurn(pairs);
@@ -162,12 +168,12 @@ RunData ReadRunData(const fs::path& run) {
 
 void AddTruth(const TruthSource& source, const MetricsOptions& options, RunData& run) {
   if (!source.file.empty()) {
-    run.truth = CompareWith(ReadTruth(source, source.file), source.file, options, run);
+    run.truth = CompareWith(source, source.file, options, run);
     return;
   }
   try {
     const std::optional<fs::path> file = TruthBesideImages(run);
-    if (file) run.truth = CompareWith(ReadTruth(source, *file), file->string(), options, run);
+    if (file) run.truth = CompareWith(source, *file, options, run);
   } catch (const std::exception& error) {
     run.truth_problem = error.what();
   }

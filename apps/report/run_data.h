@@ -21,6 +21,7 @@ namespace rotslam {
 /// Ground truth at the times of a run's frames, moved into the run's world.
 struct TruthData {
   std::string file;
+  std::vector<std::string> notes;  // what was assumed about it, one line each
   // Of rotations_tum.txt and, where there are positions, of trajectory_tum.txt: the figures of
   // `rotslam eval`.
   TrajectoryMetrics rotations;
@@ -62,7 +63,8 @@ RunData ReadRunData(const std::filesystem::path& run);
 /// Which ground truth to compare with.
 struct TruthSource {
   std::string file;   // empty: what lies with the images, if anything does
-  std::string times;  // of a KITTI file; empty: the `times.txt` beside it
+  std::string times;  // of a file without times; empty: the `times.txt` beside it
+  bool align_axes = false;  // as in MatchOptions
 };
 
 /// Sets `run.truth`. Throws std::runtime_error where a file that was asked for cannot be used; of

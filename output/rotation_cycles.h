@@ -1,0 +1,34 @@
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include "rotodom/types/view_graph.h"
+
+namespace rotslam {
+
+/// One way to read the rotations of a list of edges.
+struct EdgeReading {
+  std::string description;  // "x_j = R x_i"
+  bool is_inverse = false;  // R^T is the rotation from i to j
+  bool has_other_order = false;  // the first of the quaternion's numbers is its w, or its last
+};
+
+/// Which reading the edges are in.
+struct EdgeChoice {
+  std::size_t reading = 0;
+  std::string note;  // one line: what was chosen and what cycles say of it
+};
+
+/// Lets cycles decide: only in the right reading, rotations along a cycle of edges multiply to the
+/// identity (replacing every R_ij by its transpose reverses their order). Wrong edges are many, so
+/// the best tenth of the cycles counts. Readings that fit no better than the first lose to it.
+/// @param edges     read with w last and as j_from_i.
+/// @param readings  at least one; the first is that of the file's documentation.
+EdgeChoice ChooseEdgeReading(const std::vector<RelativeRotation>& edges,
+                             const std::vector<EdgeReading>& readings);
+
+/// An edge's rotation in a reading.
+Rotation ReadEdgeAs(const Rotation& rotation, const EdgeReading& reading);
+
+}  // namespace rotslam
