@@ -64,6 +64,7 @@ int main(int argc, char** argv) {
     rotslam::Action action;
     rotslam::AddRunCommand(app, action);
     rotslam::AddRotationsCommand(app, action);
+    rotslam::AddInspectCommand(app, action);
     rotslam::AddSolveCommand(app, action);
     rotslam::AddExportCommand(app, action);
     rotslam::AddAverageCommand(app, action);

@@ -235,6 +235,17 @@ CameraFile ReadCameraFile(const fs::path& path) {
   return file;
 }
 
+std::optional<std::string> RecogniseCameraFile(const fs::path& path) {
+  const CameraDocument document(FileToRead(path));
+  std::optional<std::string> name;
+  for (const CameraForm& form : CameraForms()) {
+    if (!form.recognises(document)) continue;
+    if (name) return std::nullopt;
+    name = form.name;
+  }
+  return name;
+}
+
 CameraReference ParseCameraReference(const std::string& text) {
   std::error_code ignored;
   const std::size_t colon = text.rfind(':');

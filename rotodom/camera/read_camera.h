@@ -2,6 +2,7 @@
 
 #include <array>
 #include <filesystem>
+#include <optional>
 #include <string>
 
 #include "rotodom/camera/camera.h"
@@ -36,6 +37,10 @@ namespace rotslam {
 /// where it has to be. Where only some of several cameras are at fault, these have it as their
 /// `problem`.
 CameraFile ReadCameraFile(const std::filesystem::path& path);
+
+/// Name of the form that a file would be read in; nullopt where none or several take it. Throws
+/// std::runtime_error when it cannot be read at all.
+std::optional<std::string> RecogniseCameraFile(const std::filesystem::path& path);
 
 /// A calibration file and the camera in it; no name: the one that ChooseCamera finds.
 struct CameraReference {

@@ -22,14 +22,6 @@ const std::vector<std::string>& OurKeys() {
   return kKeys;
 }
 
-std::string OurModels() {
-  std::string text;
-  for (const CameraModel model : AllCameraModels()) {
-    text += (text.empty() ? "" : ", ") + std::string(Name(model));
-  }
-  return text;
-}
-
 void ReadOurDistortion(const Section& section, Camera& camera) {
   const auto names = DistortionNames(camera.model);
   if (!names.empty() && !section.Has("distortion")) {
@@ -66,7 +58,7 @@ Camera ReadOurs(const Section& section) {
   }
   Camera camera;
   const auto model = FindCameraModel(section.Text("model"));
-  if (!model) section.FailValue("model", "must be one of " + OurModels());
+  if (!model) section.FailValue("model", "must be one of " + CameraModelNames());
   camera.model = *model;
   ReadSize(section, "width", "height", camera.width, camera.height);
   camera.fx = section.Positive("fx");

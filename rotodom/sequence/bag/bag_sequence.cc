@@ -206,7 +206,7 @@ class BagSequence : public Sequence {
     }
     SetTimes(frames);
     KeepWanted(frames, options);
-    FindImageSize();
+    FindImageSize(frames);
     if (!own_camera_) FindCamera();
   }
 
@@ -311,18 +311,31 @@ class BagSequence : public Sequence {
   }
 
   // Damaged images may come first, but not many.
-  void FindImageSize() {
+  void FindImageSize(const std::vector<BagFrame>& all) {
     constexpr std::size_t kMostTried = 20;
     std::string first_problem;
     for (std::size_t k = 0; k < std::min(frames_.size(), kMostTried); ++k) {
       const DecodedImage decoded = DecodeEntry(frames_[k].entry);
       if (!decoded.image.empty()) {
         image_size_ = decoded.image.size();
+        if (decoded.image.depth() != CV_8U) FindScale(all, decoded.image.depth());
         return;
       }
       if (first_problem.empty()) first_problem = decoded.problem;
     }
     Fail(place_, "topic " + topic_.name + ": none of its images can be read: " + first_problem);
+  }
+
+  // From images all over the recording, as the first ones may be dark.
+  void FindScale(const std::vector<BagFrame>& all, int depth) {
+    constexpr std::size_t kNumImages = 8;
+    std::vector<cv::Mat> images;
+    const std::size_t step = (all.size() - 1) / kNumImages + 1;
+    for (std::size_t k = 0; k < all.size(); k += step) {
+      images.push_back(DecodeEntry(all[k].entry).image);
+    }
+    scale_ = FindPixelScale(images);
+    if (const auto note = rotslam::Describe(scale_, depth)) notes_.push_back(*note);
   }
 
   // The camera of the topic beside the images, where there is one.
@@ -381,6 +394,11 @@ class BagSequence : public Sequence {
     }
   }
 
+  DecodedImage ReadFrame(const BagEntry& entry) {
+    DecodedImage decoded = DecodeEntry(entry);
+    return decoded.image.empty() ? decoded : ToEightBits(std::move(decoded.image), scale_);
+  }
+
   std::optional<Frame> Decode() override {
     if (next_ == num_frames_) return std::nullopt;
     const auto number = static_cast<std::size_t>(next_);
@@ -388,10 +406,10 @@ class BagSequence : public Sequence {
     frame.id = FrameId{next_++};
     frame.timestamp_s = timestamps_s_[number];
     frame.name = std::to_string(frames_[number].time_ns);
-    DecodedImage decoded = ahead_.valid() ? ahead_.get() : DecodeEntry(frames_[number].entry);
+    DecodedImage decoded = ahead_.valid() ? ahead_.get() : ReadFrame(frames_[number].entry);
     if (next_ < num_frames_) {
       ahead_ = std::async(std::launch::async,
-                          [this, entry = frames_[number + 1].entry] { return DecodeEntry(entry); });
+                          [this, entry = frames_[number + 1].entry] { return ReadFrame(entry); });
     }
     frame.image = std::move(decoded.image);
     frame.problem = std::move(decoded.problem);
@@ -401,6 +419,7 @@ class BagSequence : public Sequence {
   std::unique_ptr<BagReader> reader_;
   BagTopic topic_;
   std::vector<BagFrame> frames_;
+  PixelScale scale_;
   int next_ = 0;
   // Image next_, read and decoded while the caller works on the one before. It alone uses reader_
   // meanwhile, and is the first member to go.

@@ -97,7 +97,7 @@ DecodedImage DecodePlain(const RosImageFields& fields) {
       for (std::uint64_t k = 0; k + 1 < row_size; k += 2) std::swap(bytes[k], bytes[k + 1]);
     }
   }
-  return ToEightBits(Converted(pixels, encoding.conversion));
+  return {Converted(pixels, encoding.conversion), {}};
 }
 
 // The pixels' encoding before they were compressed: "rgb8" of "rgb8; jpeg compressed bgr8".
@@ -108,7 +108,6 @@ std::string_view EncodingBefore(std::string_view format) {
 
 DecodedImage DecodeCompressed(const RosImageFields& fields) {
   DecodedImage decoded = DecodeImageBytes({fields.data.begin(), fields.data.end()});
-  if (!decoded.image.empty()) decoded = ToEightBits(std::move(decoded.image));
   if (decoded.image.empty()) return decoded;
   // The transport compresses colours in the order blue, green, red, unless it says otherwise.
   if (decoded.image.channels() == 3 &&

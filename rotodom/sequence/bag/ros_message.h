@@ -75,7 +75,8 @@ RosImageFields ParseRosImage(const BagTopic& topic, std::string_view message);
 /// empty when they are.
 std::string WhyNoPicture(const BagTopic& topic, const RosImageFields& fields);
 
-/// The picture of a message; an empty one and why where it is malformed. Never throws.
+/// The picture of a message, of its depth and with blue, green and red in this order; an empty one
+/// and why where it is malformed. Never throws.
 DecodedImage DecodeRosImage(const BagTopic& topic, std::string_view message);
 
 /// Throws std::runtime_error, without a path, when the message is malformed.

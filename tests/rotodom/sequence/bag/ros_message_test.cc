@@ -38,7 +38,7 @@ TestRosImage Image(const std::string& encoding, const std::string& row0, const s
 cv::Mat Decoded(const TestRosImage& image, Serialisation how = Serialisation::kRos1) {
   const DecodedImage decoded = DecodeRosImage(ImageTopic(how), RosImageMessage(how, image));
   EXPECT_EQ(decoded.problem, "");
-  return decoded.image;
+  return ToEightBits(decoded.image, PixelScale()).image;
 }
 
 std::vector<int> Values(const cv::Mat& image) {
