@@ -107,7 +107,9 @@ Input OpenInput(const InputFlags& flags,
     ReadCalibration(flags, input);
   }
   if (!flags.rotations.empty()) {
-    input.given_rotations = ReadOrientations(flags.rotations);
+    OrientationFile file = ReadOrientationFile(flags.rotations);
+    for (const std::string& note : file.notes) tell("note:   " + flags.rotations + ": " + note);
+    input.given_rotations = std::move(file.orientations);
     input.rotations_file = flags.rotations;
   }
   for (const std::string& line : DescribeCamera(input)) tell(line);

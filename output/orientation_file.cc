@@ -4,13 +4,13 @@
 #include <stdexcept>
 #include <string>
 
+#include "output/trajectory.h"
 #include "output/unit_length.h"
 #include "rotodom/types/text_file.h"
 
 namespace rotslam {
 namespace {
 
-constexpr std::size_t kTumColumns = 8;
 constexpr std::size_t kCsvColumns = 11;
 
 Rotation RotationAt(const std::filesystem::path& path, const TextRow& row, std::size_t first) {
@@ -45,27 +45,7 @@ std::vector<StampedRotation> ReadCsv(const std::filesystem::path& path) {
   return orientations;
 }
 
-}  // namespace
-
-std::vector<StampedRotation> ReadOrientations(const std::filesystem::path& path) {
-  const std::vector<TextRow> rows = ReadTextRows(path);
-  std::vector<StampedRotation> orientations;
-  if (!rows.empty() && rows.front().words.front() == "frame") {
-    orientations = ReadCsv(path);
-  } else {
-    orientations.reserve(rows.size());
-    for (const TextRow& row : rows) {
-      if (row.words.size() != kTumColumns) {
-        throw std::runtime_error(
-            AtLine(path,
-                   row.line,
-                   "expected the 8 columns of a TUM file or the header of a rotations.csv, found " +
-                       std::to_string(row.words.size()) + " columns"));
-      }
-      orientations.push_back({NumberAt(path, row, 0), RotationAt(path, row, 4), std::nullopt});
-    }
-  }
-  if (orientations.empty()) throw std::runtime_error(path.string() + ": has no orientations");
+void SortByTime(const std::filesystem::path& path, std::vector<StampedRotation>& orientations) {
   std::stable_sort(orientations.begin(),
                    orientations.end(),
                    [](const StampedRotation& a, const StampedRotation& b) {
@@ -76,7 +56,43 @@ std::vector<StampedRotation> ReadOrientations(const std::filesystem::path& path)
     throw std::runtime_error(path.string() + ": the time " +
                              FormatNumber("%.9f", orientations[k].timestamp_s) + " is there twice");
   }
-  return orientations;
+}
+
+}  // namespace
+
+OrientationFile ReadOrientationFile(const std::filesystem::path& path) {
+  OrientationFile file;
+  const bool is_folder = std::filesystem::is_directory(path);
+  const std::vector<TextRow> rows = is_folder ? std::vector<TextRow>{} : ReadTextRows(path);
+  if (!is_folder && rows.empty()) throw std::runtime_error(path.string() + ": has no orientations");
+  if (!rows.empty() && rows.front().words.front() == "frame" &&
+      rows.front().words.size() == kCsvColumns) {
+    file.form = "rotations.csv";
+    file.orientations = ReadCsv(path);
+    if (file.orientations.empty()) {
+      throw std::runtime_error(path.string() + ": has no orientations");
+    }
+    SortByTime(path, file.orientations);
+    return file;
+  }
+  TrajectoryFile trajectory = ReadTrajectoryFile(path, std::nullopt);
+  const auto times = TimesBeside(path);
+  if (!trajectory.has_times && times) trajectory = ReadTrajectoryFile(path, times);
+  if (!trajectory.has_times) {
+    throw std::runtime_error(path.string() + ": was taken for " + trajectory.form +
+                             ", which has no times; expected a time for each orientation, or a "
+                             "times.txt beside it");
+  }
+  file.form = std::move(trajectory.form);
+  file.notes = std::move(trajectory.notes);
+  for (const StampedPose& pose : trajectory.poses) {
+    file.orientations.push_back({pose.timestamp_s, pose.world_from_cam, std::nullopt});
+  }
+  return file;
+}
+
+std::vector<StampedRotation> ReadOrientations(const std::filesystem::path& path) {
+  return ReadOrientationFile(path).orientations;
 }
 
 }  // namespace rotslam

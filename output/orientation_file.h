@@ -2,6 +2,7 @@
 
 #include <filesystem>
 #include <optional>
+#include <string>
 #include <vector>
 
 #include <Eigen/Core>
@@ -18,12 +19,22 @@ struct StampedRotation {
   std::optional<Eigen::Vector3d> sigma_deg;
 };
 
-/// Reads orientations, camera->world: a TUM file (`timestamp tx ty tz qx qy qz qw`, the positions
-/// are not looked at) or a rotations.csv as WriteRotationsCsv writes it.
-/// @return  ascending in time.
-/// Throws std::runtime_error with file, line and reason: no lines, another number of columns, a
-/// number that is not finite, a quaternion whose length is not 1 to a per cent, a time that is
-/// there twice.
+/// What a file says of orientations.
+struct OrientationFile {
+  std::vector<StampedRotation> orientations;  // ascending in time, no time twice
+  std::string form;                           // the form that the file was taken for
+  std::vector<std::string> notes;             // what was assumed or left out, one line each
+};
+
+/// Reads orientations, camera->world: any trajectory with times that ReadTrajectoryFile reads, the
+/// positions are not looked at, or a rotations.csv as WriteRotationsCsv writes it. A file without
+/// times takes those of the times.txt beside it.
+/// Throws std::runtime_error with file, line and reason: what ReadTrajectoryFile throws; no times;
+/// in a rotations.csv, a quaternion whose length is not 1 to a per cent, a time that is there
+/// twice.
+OrientationFile ReadOrientationFile(const std::filesystem::path& path);
+
+/// The orientations alone.
 std::vector<StampedRotation> ReadOrientations(const std::filesystem::path& path);
 
 }  // namespace rotslam

@@ -1,9 +1,12 @@
+#include <algorithm>
 #include <array>
 #include <cstdio>
 #include <cstdlib>
 #include <filesystem>
 #include <random>
+#include <set>
 #include <string>
+#include <vector>
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -149,6 +152,87 @@ TEST(EvalCommand, ReportsInOneLineWhatIsWrong) {
     EXPECT_THAT(result.output, testing::StartsWith("rotslam: ")) << arguments;
     EXPECT_EQ(std::count(result.output.begin(), result.output.end(), '\n'), 1) << result.output;
   }
+}
+
+// One trajectory and its truth in many forms.
+const std::filesystem::path kCases = kShared / "cases/inputs/eval";
+
+TEST(EvalCommand, ReadsTheFilesThatPeopleBring) {
+  if (!std::filesystem::exists(kCases)) GTEST_SKIP() << kCases << " is not here";
+  struct Case {
+    const char* truth;
+    const char* estimate;
+    const char* note;  // a part of one of the notes; empty for none at all
+    const char* more = "";
+  };
+  // With all 120 poses the error is 0.0631; lost ones change it a little.
+  const std::vector<Case> cases = {
+      {"gt.txt", "est.txt", ""},
+      {"gt.txt", "est_bom.txt", ""},
+      {"gt.txt", "est_bom_nohead.txt", ""},
+      {"gt.txt", "est_comma.txt", ""},
+      {"gt.txt", "est_semicolon.txt", ""},
+      {"gt.txt", "est_decimalcomma.txt", "decimal points"},
+      {"gt.txt", "est_header.txt", ""},
+      {"gt.txt", "est_trailing.txt", "is not used"},
+      {"gt.txt", "est_frameidx9.txt", "taken for an index"},
+      {"gt.txt", "est_orb3_ns.txt", "taken for ns"},
+      {"gt.txt", "est_euroc8.csv", ""},
+      {"gt.txt", "est_dup.txt", "1 pose left out whose time is there before"},
+      {"gt.txt", "est_nan.txt", "1 pose left out that is marked as lost"},
+      {"gt.txt", "est_zeroq.txt", "1 pose left out that is marked as lost"},
+      {"gt.txt", "est_kitti.txt", "paired in their order"},
+      {"gt.txt", "est_kitti13.txt", "paired in their order"},
+      {"gt.txt", "est_kitti16.txt", "paired in their order"},
+      {"gt.txt", "est_kitti.txt", "", "--times"},
+      {"gt_kitti.txt", "est_kitti.txt", ""},
+      {"gt_kitti.txt", "est.txt", "paired in their order"},
+      {"gt_kitti.txt", "est.txt", "", "--times"},
+      {"gt_dup.txt", "est.txt", "1 pose left out whose time is there before"},
+      {"gt_euroc17.csv", "est.txt", "velocities and biases are not used"},
+      {"gt_tumvi8.csv", "est.txt", ""},
+      {"gt_seconds_qw.csv", "est.txt", "gt_seconds_qw.csv is taken for qw first"},
+      {"gt_tartan.txt", "est.txt", "paired in their order"},
+      {"gt_idx.txt", "est.txt", "paired in their order"},
+      {"gt_idx.txt", "est.txt", "taken for lines of", "--times"},
+      {"gt_worldtocam.txt", "est.txt", "gt_worldtocam.txt is taken for world->camera"},
+      {"gt_body.txt", "est.txt", "which is taken out", "--align-axes"},
+      {"gt_off.txt", "est.txt", "", "--time-offset 3600"}};
+  std::set<std::string> named = {"times.txt"};
+  for (const Case& one : cases) {
+    SCOPED_TRACE(std::string(one.truth) + " " + one.estimate + " " + one.more);
+    named.insert({one.truth, one.estimate});
+    std::string more = one.more;
+    if (more == "--times") more += " " + (kCases / "times.txt").string();
+    const CommandResult result = RunEval((kCases / one.truth).string() + " " +
+                                         (kCases / one.estimate).string() + " --json " + more);
+    EXPECT_EQ(result.exit_code, 0) << result.output;
+    if (result.exit_code != 0) continue;
+    const auto json = nlohmann::json::parse(result.output);
+    EXPECT_NEAR(json.at("rpe1").get<double>(), 0.0631, 0.0015);
+    EXPECT_GE(json.at("n").get<int>(), 115);
+    const std::string notes = json.contains("notes") ? json["notes"].dump() : "";
+    EXPECT_THAT(notes, testing::HasSubstr(one.note));
+    if (*one.note == 0) EXPECT_EQ(notes, "");
+  }
+  for (const auto& entry : std::filesystem::directory_iterator(kCases)) {
+    EXPECT_TRUE(named.contains(entry.path().filename())) << entry.path();
+  }
+}
+
+TEST(EvalCommand, SaysWhatItLeavesToThePerson) {
+  if (!std::filesystem::exists(kCases)) GTEST_SKIP() << kCases << " is not here";
+  const auto with_estimate = [](const char* truth) {
+    return RunEval((kCases / truth).string() + " " + (kCases / "est.txt").string());
+  };
+  const CommandResult body = with_estimate("gt_body.txt");
+  EXPECT_EQ(body.exit_code, 0);
+  EXPECT_THAT(body.output, testing::HasSubstr("note: the estimate's axes are those of the truth"));
+  EXPECT_THAT(body.output, testing::HasSubstr("--align-axes takes it out"));
+  const CommandResult off = with_estimate("gt_off.txt");
+  EXPECT_EQ(off.exit_code, 1);
+  EXPECT_THAT(off.output, testing::HasSubstr("3600.000 s apart: --time-offset 3600"));
+  EXPECT_EQ(std::count(off.output.begin(), off.output.end(), '\n'), 1);
 }
 
 }  // namespace

@@ -8,6 +8,7 @@
 #include "output/orientation_file.h"
 #include "output/rotation_list.h"
 #include "output/trajectory.h"
+#include "output/trajectory_match.h"
 #include "tests/fuzz/fuzz_target.h"
 
 namespace rotslam {
@@ -25,6 +26,21 @@ const RegisterFuzzTarget trajectory(
       WriteTumTrajectory(folder.path() / "copy.txt", read);
       const std::vector<PosePair> pairs = AssociatePoses(read, read, {});
       if (pairs.size() >= 3) ComputeMetrics(pairs, {});
+    });
+
+// Two files, brought together.
+const RegisterFuzzTarget trajectory_match(
+    "trajectory_match", [](std::string_view bytes, const TemporaryFolder& folder) {
+      const std::vector<std::string> files = CutIntoFiles(bytes, 2);
+      const fs::path truth = folder.Write("truth.txt", files[0]);
+      const fs::path estimate = folder.Write("estimate.txt", files[1]);
+      MatchOptions options;
+      options.metrics.max_gap_s = 1.0;
+      const MatchedTrajectories matched =
+          MatchTrajectories({ReadTrajectoryFile(truth), truth.string()},
+                            {ReadTrajectoryFile(estimate), estimate.string()},
+                            options);
+      ComputeMetrics(matched.pairs, {});
     });
 
 const RegisterFuzzTarget orientations("orientations",

@@ -51,6 +51,20 @@ TEST(OrientationFile, WhatRotationsCsvSaysComesBack) {
   EXPECT_FALSE(read[1].sigma_deg.has_value());
 }
 
+TEST(OrientationFile, OtherFormsAndWhatIsLeftOut) {
+  const TemporaryFolder folder;
+  const auto euroc = folder.Write("data.csv",
+                                  "#timestamp [ns],p_x [m],p_y [m],p_z [m],q_w [],q_x [],q_y [],"
+                                  "q_z []\n1403636579763555584,1,2,3,0.6,0.8,0,0\n");
+  const OrientationFile file = ReadOrientationFile(euroc);
+  EXPECT_EQ(file.form, "EuRoC");
+  ASSERT_EQ(file.orientations.size(), 1u);
+  EXPECT_NEAR(file.orientations[0].world_from_cam.Quaternion().x(), 0.8, 1e-12);
+  const auto twice = folder.Write("tum.txt", "1 0 0 0 0 0 0 1\n1 0 0 0 0 0 0 1\n");
+  EXPECT_EQ(ReadOrientationFile(twice).orientations.size(), 1u);
+  EXPECT_EQ(ReadOrientationFile(twice).notes.size(), 1u);
+}
+
 TEST(OrientationFile, RefusesInOneLine) {
   const TemporaryFolder folder;
   std::vector<RotationRow> rows(1);
@@ -58,9 +72,9 @@ TEST(OrientationFile, RefusesInOneLine) {
   WriteRotationsCsv(folder.path() / "negative.csv", rows);
   const std::map<std::string, std::string> reasons = {
       {"# nothing\n", "has no orientations"},
-      {"1 0 0 0 0 0 0 1\n2 0 0 0 0 0 1\n", ":2: expected the 8 columns of a TUM file"},
-      {"1 0 0 0 0 0 0 1\n2 0 0 0 0 0 0 1.5\n", ":2: the quaternion is of length 1.5, not 1"},
-      {"1 0 0 0 0 0 0 1\n1 0 0 0 0 0 0 1\n", "the time 1.000000000 is there twice"}};
+      {"1 0 0 0 0 0 0 1\n2 0 0 0 0 0 1\n", ":2: expected 8 columns, as above, found 7"},
+      {"1 0 0 0 0 0 0 1.5\n", ":1: columns 5 to 8 are no quaternions of length 1"},
+      {"1 0 0 0 0 1 0 0 0 0 1 0\n", "was taken for KITTI, which has no times"}};
   for (const auto& [content, reason] : reasons) {
     const auto file = folder.Write("tum.txt", content);
     EXPECT_THAT(RuntimeErrorOf([&] { ReadOrientations(file); }), HasSubstr(reason)) << content;

@@ -1,7 +1,10 @@
 #include "output/trajectory.h"
 
+#include <algorithm>
 #include <limits>
 #include <random>
+#include <sstream>
+#include <string>
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -81,12 +84,13 @@ TEST(Trajectory, NamesTheLineThatIsWrong) {
     const auto path = folder.Write("t.txt", content);
     return RuntimeErrorOf([&] { ReadTrajectory(path); });
   };
-  EXPECT_THAT(error_of("1 0 0 0 0 0 0 1\n2 nan 0 0 0 0 0 1\n"), HasSubstr("t.txt:2: "));
+  EXPECT_THAT(error_of("1 0 0 0 0 0 0 1\nnan 0 0 0 0 0 0 1\n"), HasSubstr("t.txt:2: "));
   EXPECT_THAT(error_of("1 0 0 0 0 0 0 1\n2 1e999 0 0 0 0 0 1\n"), HasSubstr("t.txt:2: "));
   EXPECT_THAT(error_of("#\n1 0 0 0 0 0 0 one\n"), HasSubstr("t.txt:2: expected a finite number"));
   EXPECT_THAT(error_of("1 0 0 0 0 0 0 1\n2 0 0 0\n"), HasSubstr("t.txt:2: expected 8 columns"));
   EXPECT_THAT(error_of("1 2 3\n"), HasSubstr("t.txt:1: expected 8 columns (TUM) or 12 (KITTI)"));
-  EXPECT_THAT(error_of("1 0 0 0 0 0 0 0\n"), HasSubstr("t.txt:1: "));
+  EXPECT_THAT(error_of("1 0 0 0 0 0 0 0\n"), HasSubstr("has no poses: all are marked as lost"));
+  EXPECT_THAT(error_of("1 0 0.6 0 0.8 0 1 7\n"), HasSubstr("columns 2 to 5 are: name them"));
   EXPECT_THAT(error_of("2 0 0 0 0 1 0 0 0 0 1 0\n"), HasSubstr("t.txt:1: "));
   EXPECT_THAT(error_of("# nothing\n"), HasSubstr("has no poses"));
 }
@@ -100,6 +104,151 @@ TEST(Trajectory, RefusesWhatIsNoFileAndTooFewTimes) {
   const auto times = folder.Write("times.txt", "0\n1\n");
   EXPECT_THAT(RuntimeErrorOf([&] { ReadTrajectory(folder.path() / "t.txt", times); }),
               HasSubstr("has 2 timestamps for the 3 poses"));
+}
+
+// Poses without symmetries, for the forms below.
+constexpr const char* kTumLines =
+    "1403636579.763555527 1 2 3 0.1 0.2 0.3 0.9273618495495704\n"
+    "1403636579.813555479 1.5 2 3 0.2 0.2 0.3 0.9110433579144299\n"
+    "1403636579.863555431 2 2 3 0.3 0.2 0.3 0.8831760866327848\n";
+
+class TrajectoryForms : public testing::Test {
+ protected:
+  TrajectoryFile Read(const std::string& content, const std::string& name = "t.txt") const {
+    return ReadTrajectoryFile(folder_.Write(name, content));
+  }
+  Trajectory Expected() const { return Read(kTumLines).poses; }
+  void ExpectTheSame(const TrajectoryFile& file, bool has_times = true) const {
+    const Trajectory expected = Expected();
+    ExpectNear(expected, file.poses, 1e-5);
+    for (std::size_t k = 0; k < file.poses.size(); ++k) {
+      EXPECT_NEAR(file.poses[k].timestamp_s,
+                  has_times ? expected[k].timestamp_s : static_cast<double>(k),
+                  1e-6);
+    }
+    EXPECT_EQ(file.has_times, has_times);
+  }
+  static std::string Replaced(std::string text, char from, char to) {
+    std::replace(text.begin(), text.end(), from, to);
+    return text;
+  }
+  const TemporaryFolder folder_;
+};
+
+TEST_F(TrajectoryForms, TumWithWhateverSeparates) {
+  EXPECT_THAT(Read(kTumLines).notes, testing::IsEmpty());
+  EXPECT_EQ(Read(kTumLines).form, "TUM");
+  ExpectTheSame(Read(Replaced(kTumLines, ' ', ',')));
+  ExpectTheSame(Read(Replaced(kTumLines, ' ', ';')));
+  ExpectTheSame(Read(Replaced(kTumLines, ' ', '\t')));
+  const TrajectoryFile commas = Read(Replaced(kTumLines, '.', ','));
+  ExpectTheSame(commas);
+  EXPECT_THAT(commas.notes, testing::ElementsAre(HasSubstr("taken for decimal points")));
+  ExpectTheSame(Read("\xef\xbb\xbf# x\r\n" + std::string(kTumLines)));
+  const TrajectoryFile named = Read("timestamp tx ty tz qx qy qz qw\n" + std::string(kTumLines));
+  ExpectTheSame(named);
+  EXPECT_FALSE(named.is_order_assumed);
+}
+
+TEST_F(TrajectoryForms, ANinthColumnIsAnIndexOrAConstant) {
+  std::string indexed;
+  std::string trailing;
+  int index = 0;
+  std::istringstream lines(kTumLines);
+  for (std::string line; std::getline(lines, line);) {
+    indexed += std::to_string(index++) + ' ' + line + '\n';
+    trailing += line + " 0\n";
+  }
+  ExpectTheSame(Read(indexed));
+  ExpectTheSame(Read(trailing));
+  EXPECT_THAT(Read(trailing).notes, testing::ElementsAre(HasSubstr("always 0, is not used")));
+  EXPECT_THAT(RuntimeErrorOf([&] { Read("1 2 3 4 0 0 0 1 5\n1 2 3 4 0 0 0 1 6\n"); }),
+              HasSubstr("t.txt:1: expected 8 columns"));
+}
+
+TEST_F(TrajectoryForms, EurocHasNanosecondsAndWFirst) {
+  const std::string rows =
+      "1403636579763555527,1,2,3,0.9273618495495704,0.1,0.2,0.3\n"
+      "1403636579813555479,1.5,2,3,0.9110433579144299,0.2,0.2,0.3\n"
+      "1403636579863555431,2,2,3,0.8831760866327848,0.3,0.2,0.3\n";
+  const TrajectoryFile named = Read(
+      "#timestamp [ns], p_RS_R_x [m], p_RS_R_y [m], p_RS_R_z [m], q_RS_w [], q_RS_x [], q_RS_y [], "
+      "q_RS_z []\n" + rows);
+  ExpectTheSame(named);
+  EXPECT_EQ(named.form, "EuRoC");
+  EXPECT_THAT(named.notes, testing::IsEmpty());
+  const TrajectoryFile bare = Read(rows);
+  ExpectTheSame(bare);
+  EXPECT_TRUE(bare.is_order_assumed);
+  const auto copy = folder_.path() / "ours.csv";
+  WriteEurocTrajectory(copy, named.poses);
+  ExpectTheSame(ReadTrajectoryFile(copy));
+  // ORB-SLAM3 writes nanoseconds into TUM's columns.
+  const TrajectoryFile nanoseconds = Read("1403636579763555584.000000 1 2 3 0 0 0 1\n");
+  EXPECT_NEAR(nanoseconds.poses[0].timestamp_s, 1403636579.763555584, 1e-6);
+  EXPECT_THAT(nanoseconds.notes, testing::ElementsAre("its times are taken for ns"));
+}
+
+TEST_F(TrajectoryForms, MatricesInALineOverLinesAndInFiles) {
+  std::string twelve;
+  std::string thirteen;
+  std::string rows;
+  std::filesystem::create_directory(folder_.path() / "seq-01");
+  int index = 0;
+  for (const StampedPose& pose : Expected()) {
+    std::string row;
+    const Eigen::Matrix3d R = pose.world_from_cam.Matrix();
+    for (int r = 0; r < 3; ++r) {
+      for (int c = 0; c < 3; ++c) row += std::to_string(R(r, c)) + ' ';
+      row += std::to_string(pose.center_in_world[r]) + (r < 2 ? " " : "");
+    }
+    std::string cut;
+    int word = 0;
+    for (const char c : row) cut += c == ' ' && ++word % 4 == 0 ? '\n' : c;
+    twelve += row + '\n';
+    thirteen += std::to_string(index) + ' ' + row + '\n';
+    rows += cut + "\n0 0 0 1\n\n";
+    folder_.Write("seq-01/frame-00000" + std::to_string(index++) + ".pose.txt",
+                  cut + "\n0 0 0 1\n");
+  }
+  ExpectTheSame(Read(twelve), false);
+  ExpectTheSame(Read(thirteen), false);
+  ExpectTheSame(Read(rows), false);
+  EXPECT_EQ(Read(rows).form, "matrices over several lines");
+  const TrajectoryFile folder = ReadTrajectoryFile(folder_.path() / "seq-01");
+  ExpectTheSame(folder, false);
+  EXPECT_EQ(folder.form, "folder of pose files");
+}
+
+TEST_F(TrajectoryForms, TartanAirHasNoTimesAndItsOwnAxes) {
+  std::string text;
+  std::istringstream lines(kTumLines);
+  for (std::string line; std::getline(lines, line);) text += line.substr(line.find(' ') + 1) + '\n';
+  ExpectTheSame(Read(text), false);
+  const TrajectoryFile turned = Read(text, "pose_left.txt");
+  // Forward is x there, z here.
+  const Eigen::Vector3d forward = Expected()[1].world_from_cam * Eigen::Vector3d::UnitX();
+  EXPECT_LT((turned.poses[1].world_from_cam * Eigen::Vector3d::UnitZ() - forward).norm(), 1e-9);
+}
+
+TEST_F(TrajectoryForms, LostPosesAndTimesThatAreThereTwiceAreLeftOut) {
+  const TrajectoryFile file = Read(std::string(kTumLines) +
+                                   "1403636579.9 nan nan nan nan nan nan nan\n"
+                                   "1403636580.0 0 0 0 0 0 0 0\n"
+                                   "1403636579.813555479 1.5 2 3 0 0 0 1\n");
+  ExpectTheSame(file);
+  EXPECT_THAT(file.notes,
+              testing::ElementsAre(HasSubstr("2 poses left out that are marked as lost (nan or "
+                                             "zero), the first in line 4"),
+                                   HasSubstr("1 pose left out whose time is there before, the "
+                                             "first in line 6 (up to")));
+}
+
+TEST_F(TrajectoryForms, OtherFilesAreNotRecognised) {
+  EXPECT_EQ(RecogniseTrajectory(folder_.Write("t.txt", kTumLines)), "TUM");
+  for (const char* other : {"EDGE_SE3:QUAT 0 1 0 0 0 0 0 0 1\n", "camera: 1\nfx: 2\n", ""}) {
+    EXPECT_EQ(RecogniseTrajectory(folder_.Write("t.txt", other)), std::nullopt) << other;
+  }
 }
 
 TEST(Trajectory, IsNotWrittenWhenNotFinite) {
