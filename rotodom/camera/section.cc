@@ -242,8 +242,13 @@ std::vector<double> Section::Numbers(const std::string& key,
     wanted += std::to_string(counts[k]);
   }
   if (!Has(key)) Fail(key, "is missing: " + wanted + " values, " + names);
+  // "380,5, 382,0" is a list of twice as many.
+  const bool may_have_commas = std::any_of(counts.begin(), counts.end(), [&](std::size_t count) {
+    return count > 0 && numbers.size() == 2 * count;
+  });
   Fail(key,
-       "has " + std::to_string(numbers.size()) + " values, must have " + wanted + ": " + names);
+       "has " + std::to_string(numbers.size()) + " values, must have " + wanted + ": " + names +
+           (may_have_commas ? "; if these are decimal commas, write points" : ""));
 }
 
 Section Section::Map(const std::string& key) const {

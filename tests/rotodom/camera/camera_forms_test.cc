@@ -119,6 +119,10 @@ TEST(CameraForms, DecimalCommasAreNamed) {
               HasSubstr("calib.txt:1: fx is '380,5', a number with a decimal comma"));
   EXPECT_THAT(CalibrationComplaint("P0: 7,1e2 0 6 0 0 7 1 0 0 0 1 0\n"),
               HasSubstr("calib.txt:1: P0[0] is '7,1e2', a number with a decimal comma"));
+  EXPECT_THAT(
+      CalibrationComplaint("camera_model: pinhole\nintrinsics: [380,5, 382,0, 250,0, 1,0]\n"),
+      HasSubstr("calib.txt:2: intrinsics has 8 values, must have 4: fx fy cx cy; if these are "
+                "decimal commas, write points"));
   EXPECT_EQ(ReadChosen("380.5,382,250,172\n").fy, 382.0);
   EXPECT_EQ(ReadChosen("380.5, 382, 250, 172\n").fy, 382.0);
 }
