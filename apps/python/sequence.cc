@@ -58,10 +58,13 @@ class PySequence {
 
   std::optional<Camera> OwnCamera() const {
     const auto& reference = sequence_->camera_reference();
-    if (!reference) return sequence_->own_camera();
     const cv::Size size = sequence_->image_size();
-    return MatchToImages(
-        ReadCamera(*reference, sequence_->image_folder(), {size.width, size.height}), size);
+    if (reference) {
+      return MatchToImages(
+          ReadCamera(*reference, sequence_->image_folder(), {size.width, size.height}), size);
+    }
+    const auto& camera = sequence_->own_camera();
+    return camera ? std::optional(MatchToImages(*camera, size)) : std::nullopt;
   }
 
   std::optional<std::string> GroundTruth() const {

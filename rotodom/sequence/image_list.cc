@@ -80,17 +80,24 @@ std::optional<CameraReference> FirstCamera(std::initializer_list<fs::path> candi
   return file ? std::optional<CameraReference>({*file, {}}) : std::nullopt;
 }
 
+namespace {
+
+// Names of calibration files, the likelier ones first.
+std::vector<std::string> CalibrationNames() {
+  return {"camera.yaml",     "camera.yml",       "sensor.yaml",          "calib.txt",
+          "camera.txt",      "camchain.yaml",    "calib_cam_to_cam.txt", "ost.yaml",
+          "ost.txt",         "camera_info.yaml", "calibration.yaml",     "calib.yaml",
+          "calibration.yml", "calib.yml",        "intrinsics.yaml",      "intrinsics.yml",
+          "calibration.xml", "calib.json",       "transforms.json",      "sfm_data.json",
+          "cameras.txt",     "cameras.bin"};
+}
+
+}  // namespace
+
 std::optional<CameraReference> FindCamera(const std::vector<fs::path>& folders,
                                           std::vector<std::string>& notes) {
-  static constexpr std::array<const char*, 22> kNames = {
-      "camera.yaml",     "camera.yml",       "sensor.yaml",          "calib.txt",
-      "camera.txt",      "camchain.yaml",    "calib_cam_to_cam.txt", "ost.yaml",
-      "ost.txt",         "camera_info.yaml", "calibration.yaml",     "calib.yaml",
-      "calibration.yml", "calib.yml",        "intrinsics.yaml",      "intrinsics.yml",
-      "calibration.xml", "calib.json",       "transforms.json",      "sfm_data.json",
-      "cameras.txt",     "cameras.bin"};
   std::vector<fs::path> found;
-  for (const char* name : kNames) {
+  for (const std::string& name : CalibrationNames()) {
     for (const fs::path& folder : folders) {
       const fs::path file = folder / name;
       const bool is_new = std::find(found.begin(), found.end(), file) == found.end();

@@ -116,8 +116,9 @@ class Sequence {
   /// with the images goes first.
   const std::optional<Camera>& own_camera() const { return own_camera_; }
 
-  /// Camera trajectory that lies with the images, in TUM or KITTI form: `groundtruth_tum.txt`,
-  /// `groundtruth_cam0_tum.txt`, `groundtruth.txt`, `poses.txt`.
+  /// Camera trajectory that lies with the images: `groundtruth_tum.txt`,
+  /// `groundtruth_cam0_tum.txt`, `groundtruth.txt` or `poses.txt`, else the data set's own, which
+  /// is a folder where each frame has a pose file.
   const std::optional<std::filesystem::path>& GroundTruthFile() const { return ground_truth_file_; }
 
  protected:
@@ -144,21 +145,19 @@ class Sequence {
   std::optional<std::filesystem::path> ground_truth_file_;
 };
 
-/// Recognises what lies at `path` by looking at it:
-///   video          a file that FFmpeg takes for one
-///   EuRoC ASL      `mav0/cam0/data.csv` below the path, or the path is `mav0` or a `cam*` of it
-///   KITTI odometry `image_0/` (else `image_2/`) and `times.txt`; or the path is such an `image_*`
-///   TUM RGB-D      `rgb.txt`
-///   image folder   images in the folder itself, else in its `images/`
-/// Timestamps come from the data set's list, or the names in an image folder, where each is seconds
-/// (EuRoC: ns; in names with a point) or the ms, us or ns since 1970 of a date in this century,
-/// else from `fps`, and images are ordered by time or, digits counting as numbers, by name. A video
-/// has its own timestamps; those of a bare stream of frames are made up, and it is said.
+/// Opens what lies at `path`, recognised by one of SequenceForms (sequence_form.h), where each is
+/// described.
+///
+/// Timestamps come from the data set's list, from a list that lies with the images, or from their
+/// names (image_times.h, times.h); else options.fps makes them up, which is noted. Images are
+/// ordered by time or, digits counting as numbers, by name. A video has its own timestamps;
+/// those of a bare stream of frames are made up, which is noted.
 ///
 /// Images are taken as stored, whatever orientation their EXIF data ask for (a phone changes its
 /// mind in mid-sequence when it looks up or down); videos are turned upright as players do, by
 /// their display matrix.
-/// 16-bit images are scaled to 8 bits, transparency is dropped.
+/// Pixels of 10 to 16 bits and floating-point ones are scaled to 8 bits, the same for the whole
+/// sequence (image_file.h), which is noted; transparency is dropped.
 ///
 /// Throws std::invalid_argument when options.Problem(); std::runtime_error, with path and reason in
 /// one line, when nothing is there, nothing can be read, a list is malformed, or timestamps do not
