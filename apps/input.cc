@@ -6,7 +6,6 @@
 #include "apps/focal_guess.h"
 #include "apps/input_lines.h"
 #include "rotodom/camera/camera_form.h"
-#include "rotodom/camera/camera_form.h"
 #include "rotodom/camera/read_camera.h"
 #include "rotodom/loop/vocabulary_file.h"
 #include "rotodom/sequence/sequence_form.h"
@@ -71,8 +70,8 @@ void ReadCalibration(const InputFlags& flags, Input& input) {
     const NamedCamera chosen = ChooseCamera(file, reference, sequence.image_folder());
     camera = AtSize(chosen, size.width, size.height);
     input.camera_file = reference.file.string();
-    input.camera_source = input.camera_file + (chosen.name.empty() ? "" : ":" + chosen.name) +
-                          ", " + file.form;
+    input.camera_source =
+        input.camera_file + (chosen.name.empty() ? "" : ":" + chosen.name) + ", " + file.form;
     input.camera_notes = file.notes;
   } else if (const auto& own_camera = sequence.own_camera()) {
     input.camera_file = sequence.form();

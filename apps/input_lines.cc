@@ -40,9 +40,9 @@ std::string DescribeTimes(const std::vector<double>& times_s) {
     if (interval_s > times_s[largest] - times_s[largest - 1]) largest = k;
   }
   if (num_gaps > 0) {
-    text += ", " + std::to_string(num_gaps) + (num_gaps == 1 ? " gap" : " gaps") + ", the longest " +
-            Number("%.3g s", times_s[largest] - times_s[largest - 1]) + " after number " +
-            std::to_string(largest - 1);
+    text += ", " + std::to_string(num_gaps) + (num_gaps == 1 ? " gap" : " gaps") +
+            ", the longest " + Number("%.3g s", times_s[largest] - times_s[largest - 1]) +
+            " after number " + std::to_string(largest - 1);
   }
   if (num_equal > 0) text += ", " + std::to_string(num_equal) + " there twice";
   return text;

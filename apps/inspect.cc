@@ -19,8 +19,11 @@
 #include "apps/input_lines.h"
 #include "apps/progress.h"
 #include "apps/thumbnail.h"
+#include "output/rotation_graph_form.h"
 #include "output/rotation_list.h"
 #include "output/trajectory.h"
+#include "output/trajectory_form.h"
+#include "rotodom/camera/camera_form.h"
 #include "rotodom/camera/read_camera.h"
 #include "rotodom/sequence/sequence_form.h"
 #include "rotodom/types/disjoint_sets.h"
@@ -37,6 +40,7 @@ struct InspectFlags {
   std::string frame;  // file for the first frame; empty: none
   std::string times;  // of trajectories without times
   std::optional<double> fps;
+  bool forms = false;
 };
 
 void PrintLine(const std::string& line) { std::printf("%s\n", line.c_str()); }
@@ -85,7 +89,8 @@ int InspectSequence(const InspectFlags& flags) {
     PrintLine(std::string("camera: ") + error.what());
     exit_code = 1;
   }
-  if (const auto& truth = input.sequence->GroundTruthFile()) PrintLine("truth:  " + truth->string());
+  if (const auto& truth = input.sequence->GroundTruthFile())
+    PrintLine("truth:  " + truth->string());
   if (first && first->image.empty()) {
     PrintLine("frame:  " + first->name + " cannot be read: " + first->problem);
     return 1;
@@ -147,7 +152,25 @@ int InspectTrajectory(const InspectFlags& flags) {
   return 0;
 }
 
+// One table of forms as Markdown has it.
+template <class Form>
+void PrintForms(const char* title, const std::vector<Form>& forms) {
+  std::printf("### %s\n\n| form | how it is told |\n|---|---|\n", title);
+  for (const Form& form : forms) {
+    std::printf("| %s | %s |\n", form.name.c_str(), form.description.c_str());
+  }
+  std::printf("\n");
+}
+
 int Inspect(const InspectFlags& flags) {
+  if (flags.forms) {
+    PrintForms("Sequences", SequenceForms());
+    PrintForms("Camera files", CameraForms());
+    PrintForms("Trajectories", TrajectoryForms());
+    PrintForms("Graphs of relative rotations", RotationGraphForms());
+    return 0;
+  }
+  if (flags.input.empty()) throw std::invalid_argument("inspect: give an input, or --forms");
   const CameraReference reference = ParseCameraReference(flags.input);
   // Text is asked first: a folder may hold poses, a video is anything that no other form takes.
   std::error_code ignored;
@@ -167,13 +190,13 @@ void AddInspectCommand(CLI::App& app, Action& action) {
   const auto flags = std::make_shared<InspectFlags>();
   CLI::App* command = app.add_subcommand(
       "inspect", "What an input is taken for: a sequence, camera file, trajectory or graph");
-  command->add_option("input", flags->input, "Sequence, camera file, trajectory or graph")
-      ->required();
+  command->add_option("input", flags->input, "Sequence, camera file, trajectory or graph");
   command->add_option("--camera", flags->camera, "Calibration of a sequence, FILE or FILE:NAME");
   command->add_option("--frame", flags->frame, "PNG file for the first frame, as it is read");
   command->add_option("--fps", flags->fps, "Frames per second where a sequence has no times")
       ->check(AboveZero());
   command->add_option("--times", flags->times, "Timestamps of a trajectory without times");
+  command->add_flag("--forms", flags->forms, "List all forms that are read, as Markdown tables");
   AddCommonFlags(*command, flags->common);
   command->footer("Example: rotslam inspect footage.mp4 --camera phone.yaml --frame first.png");
   command->callback([flags, &action] { action = [flags] { return Inspect(*flags); }; });

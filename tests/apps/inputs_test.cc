@@ -30,17 +30,6 @@ fs::path Place() { return fs::path(ROTSLAM_SHARED_DIR) / "cases" / "inputs"; }
 
 std::string FirstLine(const std::string& text) { return text.substr(0, text.find('\n')); }
 
-// The error's line without the program's name and the folders of the machine.
-std::string ShownError(const CommandResult& result) {
-  std::string text = FirstLine(result.error);
-  const std::string folder = Place().string() + "/";
-  for (std::size_t at = 0; (at = text.find(folder)) != std::string::npos;) {
-    text.erase(at, folder.size());
-  }
-  const std::string program = "rotslam: ";
-  return text.starts_with(program) ? text.substr(program.size()) : text;
-}
-
 // One line of the table in the docs.
 std::string Row(const std::string& input, std::string outcome) {
   std::replace(outcome.begin(), outcome.end(), '|', '/');
@@ -131,10 +120,51 @@ constexpr CameraCase kCameraCases[] = {
 struct TrajectoryCase {
   const char* truth;
   const char* estimate;
-  std::vector<std::string> more;
-  bool is_read;      // to RPE_1 = 0.063; else `says` is in the line that refuses it
-  const char* says;  // a part of what it says
+  const char* option;  // of `eval`; empty: none
+  bool is_read;        // RPE_1 is 0.063 deg; else one line refuses it
+  const char* says;    // a part of what is said
 };
+
+constexpr TrajectoryCase kTrajectoryCases[] = {
+    {"gt.txt", "est.txt", "", true, ""},
+    {"gt.txt", "est_bom.txt", "", true, ""},
+    {"gt.txt", "est_bom_nohead.txt", "", true, ""},
+    {"gt.txt", "est_comma.txt", "", true, ""},
+    {"gt.txt", "est_decimalcomma.txt", "", true, "decimal commas"},
+    {"gt.txt", "est_dup.txt", "", true, ""},
+    {"gt.txt", "est_euroc8.csv", "", true, ""},
+    {"gt.txt", "est_frameidx9.txt", "", true, ""},
+    {"gt.txt", "est_header.txt", "", true, ""},
+    {"gt_kitti.txt", "est_kitti.txt", "", true, ""},
+    {"gt_kitti.txt", "est_kitti13.txt", "", true, ""},
+    {"gt_kitti.txt", "est_kitti16.txt", "", true, ""},
+    {"gt.txt", "est_nan.txt", "", true, "nan"},
+    {"gt.txt", "est_orb3_ns.txt", "", true, ""},
+    {"gt.txt", "est_semicolon.txt", "", true, ""},
+    {"gt.txt", "est_trailing.txt", "", true, ""},
+    {"gt.txt", "est_zeroq.txt", "", true, ""},
+    {"gt_body.txt", "est.txt", "--align-axes", true, "axes"},
+    {"gt_dup.txt", "est.txt", "", true, ""},
+    {"gt_euroc17.csv", "est.txt", "", true, ""},
+    {"gt_idx.txt", "est_kitti.txt", "", true, ""},
+    {"gt_off.txt", "est.txt", "", false, "3600"},
+    {"gt_seconds_qw.csv", "est.txt", "", true, ""},
+    {"gt_tartan.txt", "est_kitti.txt", "", true, ""},
+    {"gt_tumvi8.csv", "est.txt", "", true, ""},
+    {"gt_worldtocam.txt", "est.txt", "", true, "world"},
+};
+
+// ---- graphs
+
+struct GraphCase {
+  const char* file;
+  const char* says;
+};
+
+constexpr GraphCase kGraphCases[] = {{"EGs.txt", "1DSfM"},
+                                     {"decimalcomma.g2o", "decimal commas"},
+                                     {"ok.g2o", "g2o"},
+                                     {"relpose.txt", "relpose"}};
 
 class Inputs : public testing::Test {
  protected:
@@ -165,29 +195,66 @@ class Inputs : public testing::Test {
   const TemporaryFolder folder_;
 };
 
+// The part of the docs between two marks; with ROTSLAM_UPDATE_DOCS set it is replaced by `text`.
+std::string DocsBetween(const std::string& mark, const std::string& text) {
+  const fs::path file = fs::path(ROTSLAM_DOCS_DIR) / "inputs.md";
+  std::string docs = ReadWholeFile(file);
+  const std::string begin_mark = "<!-- " + mark + " -->\n";
+  const std::size_t begin = docs.find(begin_mark) + begin_mark.size();
+  const std::size_t end = docs.find("<!-- end of " + mark + " -->");
+  if (std::getenv("ROTSLAM_UPDATE_DOCS") != nullptr) {
+    docs.replace(begin, end - begin, text);
+    std::ofstream(file) << docs;
+    return text;
+  }
+  return docs.substr(begin, end - begin);
+}
+
+std::string WithoutFolders(std::string text) {
+  const std::string folder = Place().string() + "/";
+  for (std::size_t at = 0; (at = text.find(folder)) != std::string::npos;) {
+    text.erase(at, folder.size());
+  }
+  return text;
+}
+
+// Joins the notes that a command has said.
+std::string NotesIn(const std::string& output) {
+  std::string notes;
+  for (const std::string& line : Lines(output)) {
+    if (line.starts_with("note: ")) notes += "; " + line.substr(line.find_first_not_of(' ', 5));
+  }
+  return notes;
+}
+
+TEST(InputForms, TableInTheDocsIsTrue) {
+  const CommandResult result = Rotslam({"inspect", "--forms"});
+  ASSERT_EQ(result.exit_code, 0) << result.error;
+  EXPECT_EQ(DocsBetween("forms", result.output), result.output)
+      << "run inputs_test with ROTSLAM_UPDATE_DOCS=1";
+}
+
 TEST_F(Inputs, EveryOneIsReadRightOrRefusedInOneLine) {
-  std::string table;
+  std::string table = "| input | what comes out |\n|---|---|\n";
   std::set<std::string> seen;
   for (const CameraCase& input : kCameraCases) {
     SCOPED_TRACE(std::string(input.file) + ":" + input.camera);
-    seen.insert(input.file);
+    seen.insert(std::string("calib/") + input.file);
     const std::string name =
         std::string(input.file) + (*input.camera == '\0' ? "" : std::string(":") + input.camera);
     const std::string reference = (Place() / "calib" / name).string();
-    // A chain of cameras is read; only where one is to be chosen it matters which.
     const std::string frames = *input.frames == '\0' ? "pin" : input.frames;
     const CommandResult result =
         Rotslam({"inspect", (Place() / "frames" / frames).string(), "--camera", reference});
     const std::vector<std::string> lines = Lines(result.output);
     const auto camera = std::find_if(
         lines.begin(), lines.end(), [](const auto& line) { return line.starts_with("camera: "); });
-    ASSERT_NE(camera, lines.end()) << result.output << result.error;
-    std::string outcome = camera->substr(8);
-    EXPECT_THAT(result.output, HasSubstr(input.says));
-    const std::string folder = Place().string() + "/";
-    for (std::size_t at = 0; (at = outcome.find(folder)) != std::string::npos;) {
-      outcome.erase(at, folder.size());
+    if (camera == lines.end()) {
+      ADD_FAILURE() << result.output << result.error;
+      continue;
     }
+    std::string outcome = WithoutFolders(camera->substr(8));
+    EXPECT_THAT(outcome, HasSubstr(input.says));
     if (*input.frames != '\0') {
       const double error_deg = ErrorOfFrames(input.frames, reference);
       EXPECT_GE(error_deg, 0.0);
@@ -196,10 +263,68 @@ TEST_F(Inputs, EveryOneIsReadRightOrRefusedInOneLine) {
     }
     table += Row("calib/" + name, outcome);
   }
-  for (const auto& entry : fs::directory_iterator(Place() / "calib")) {
-    EXPECT_TRUE(seen.contains(entry.path().filename().string())) << entry.path();
+  for (const TrajectoryCase& input : kTrajectoryCases) {
+    SCOPED_TRACE(std::string(input.truth) + " " + input.estimate);
+    seen.insert({std::string("eval/") + input.truth, std::string("eval/") + input.estimate});
+    std::vector<std::string> arguments = {"eval",
+                                          (Place() / "eval" / input.truth).string(),
+                                          (Place() / "eval" / input.estimate).string()};
+    if (*input.option != '\0') arguments.emplace_back(input.option);
+    const CommandResult shown = Rotslam(arguments);
+    arguments.emplace_back("--json");
+    const CommandResult result = Rotslam(arguments);
+    EXPECT_EQ(result.exit_code == 0, input.is_read) << result.error;
+    EXPECT_THAT(shown.output + shown.error, HasSubstr(input.says));
+    std::string outcome = WithoutFolders(FirstLine(shown.error));
+    if (input.is_read && result.exit_code == 0) {
+      const double error_deg = ErrorDeg(result);
+      EXPECT_NEAR(error_deg, kTrajectoryErrorDeg, 1e-3);
+      outcome = "RPE_1 " + Fixed(error_deg) + " deg" + NotesIn(WithoutFolders(shown.output));
+    }
+    table += Row(std::string("eval/") + input.truth + " " + input.estimate +
+                     (*input.option == '\0' ? "" : std::string(" ") + input.option),
+                 outcome);
   }
-  std::ofstream("/tmp/inputs_table.md") << table;
+  for (const GraphCase& input : kGraphCases) {
+    SCOPED_TRACE(input.file);
+    seen.insert(std::string("graph/") + input.file);
+    const CommandResult result = Rotslam({"inspect", (Place() / "graph" / input.file).string()});
+    EXPECT_EQ(result.exit_code, 0) << result.error;
+    EXPECT_THAT(result.output, HasSubstr(input.says));
+    table += Row(std::string("graph/") + input.file,
+                 WithoutFolders(FirstLine(result.output)).substr(8) + NotesIn(result.output));
+  }
+  seen.insert({"eval/times.txt", "graph/truth_cw.txt"});
+  for (const char* folder : {"calib", "eval", "graph"}) {
+    for (const auto& entry : fs::directory_iterator(Place() / folder)) {
+      const std::string name = folder + ("/" + entry.path().filename().string());
+      EXPECT_TRUE(seen.contains(name)) << name << " is in no case";
+    }
+  }
+  EXPECT_EQ(DocsBetween("cases", table), table) << "run inputs_test with ROTSLAM_UPDATE_DOCS=1";
+}
+
+TEST_F(Inputs, VideosAreUprightAndHaveTheirTimes) {
+  const fs::path place = Place() / "video";
+  const fs::path out = folder_.path() / "out";
+  const CommandResult run = Rotslam({"rotations",
+                                     (place / "phone_upright.mp4").string(),
+                                     "--camera",
+                                     (place / "port.yaml").string(),
+                                     "--out",
+                                     out.string(),
+                                     "--no-report"});
+  ASSERT_EQ(run.exit_code, 0) << run.error;
+  EXPECT_THAT(run.error, HasSubstr("360x480"));
+  const double error_deg = ErrorDeg(Rotslam({"eval",
+                                             (place / "port_truth_tum.txt").string(),
+                                             (out / "rotations_tum.txt").string(),
+                                             "--json"}));
+  EXPECT_GE(error_deg, 0.0);
+  EXPECT_LT(error_deg, 0.05);  // compressed as a phone's
+  const CommandResult film = Rotslam({"inspect", (place / "f10.mp4").string()});
+  EXPECT_THAT(film.output, HasSubstr(" 10 a second"));
+  EXPECT_THAT(film.output, testing::Not(HasSubstr("gap")));
 }
 
 }  // namespace
