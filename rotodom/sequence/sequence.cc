@@ -187,10 +187,6 @@ std::string Sequence::Describe() const {
   return text.str();
 }
 
-std::unique_ptr<Sequence> OpenVideo(Layout layout, const SequenceOptions& options) {
-  return std::make_unique<VideoSequence>(std::move(layout), options);
-}
-
 std::unique_ptr<Sequence> OpenSequence(const fs::path& path, const SequenceOptions& options) {
   if (const auto problem = options.Problem()) {
     throw std::invalid_argument("sequence options: " + *problem);
