@@ -17,6 +17,7 @@ using Folder = std::string;
 const std::map<Folder, std::set<Folder>> kAllowed = {
     {"rotodom/types", {}},
     {"rotodom/camera", {"rotodom/types"}},
+    {"rotodom/camera/forms", {"rotodom/types", "rotodom/camera"}},
     {"rotodom/sequence", {"rotodom/types", "rotodom/camera"}},
     {"rotodom/sequence/forms", {"rotodom/types", "rotodom/camera", "rotodom/sequence"}},
     {"rotodom/features", {"rotodom/types", "rotodom/camera"}},
@@ -54,7 +55,8 @@ const std::map<Folder, std::set<Folder>> kAllowed = {
 const std::string kTop = "apps";
 
 // These build and test without OpenCV.
-const std::set<Folder> kWithoutOpenCv = {"rotodom/types", "rotodom/camera", "krot", "ba", "output"};
+const std::set<Folder> kWithoutOpenCv = {
+    "rotodom/types", "rotodom/camera", "rotodom/camera/forms", "krot", "ba", "output"};
 
 struct Include {
   Folder from;
