@@ -375,6 +375,7 @@ void AddImages(std::vector<fs::path> files,
                const std::vector<fs::path>& places,
                const SequenceOptions& options,
                Layout& layout) {
+  if (files.empty()) Fail(layout.folder, "holds no images");
   if (AddWithListedTimes(files, places, layout)) return;
   std::vector<std::string> stems;
   stems.reserve(files.size());

@@ -18,7 +18,8 @@ namespace rotslam {
 /// Images that a list with names leaves out are left out, which is noted; so is a list that does
 /// not fit.
 /// @param files  in the order of their names.
-/// Throws std::runtime_error naming file and line where a list holds something else than a time.
+/// Throws std::runtime_error naming file and line where a list holds something else than a time, or
+/// the folder where `files` is empty.
 void AddImages(std::vector<std::filesystem::path> files,
                const std::vector<std::filesystem::path>& places,
                const SequenceOptions& options,

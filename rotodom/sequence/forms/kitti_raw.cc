@@ -21,14 +21,16 @@ std::optional<fs::path> KittiRawCamera(const fs::path& path) {
   return std::nullopt;
 }
 
-Layout ListKittiRaw(const fs::path& camera_folder) {
+Layout ListKittiRaw(const fs::path& camera_folder, const SequenceOptions& options) {
   Layout layout;
   layout.folder = camera_folder / "data";
   const fs::path list = camera_folder / "timestamps.txt";
-  if (!IsFile(list)) {
-    Fail(list, "is missing; copy the images elsewhere to take them without it");
+  if (IsFile(list)) {
+    AddNumberedImages(ImagesIn(layout.folder), list, layout);
+  } else {
+    layout.notes.push_back(list.string() + " is missing");
+    AddImages(ImagesIn(layout.folder), {camera_folder}, options, layout);
   }
-  AddNumberedImages(ImagesIn(layout.folder), list, layout);
   const fs::path drive = camera_folder.parent_path();
   layout.camera = FirstCamera({drive / "camera.yaml",
                                camera_folder / "camera.yaml",
@@ -50,8 +52,8 @@ SequenceForm SequenceFormKittiRaw() {
       "a drive: `image_00/data/` and `image_00/timestamps.txt`; or the folder is an `image_0*` of "
       "it";
   form.recognises = [](const fs::path& path) { return KittiRawCamera(path).has_value(); };
-  form.list = [](const fs::path& path, const SequenceOptions&) {
-    return ListKittiRaw(KittiRawCamera(path).value_or(path));
+  form.list = [](const fs::path& path, const SequenceOptions& options) {
+    return ListKittiRaw(KittiRawCamera(path).value_or(path), options);
   };
   return form;
 }

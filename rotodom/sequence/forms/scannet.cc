@@ -42,9 +42,7 @@ Layout ListScannet(const fs::path& path, const SequenceOptions& options) {
   const fs::path root = ScannetRoot(path);
   Layout layout;
   layout.folder = root / "color";
-  std::vector<fs::path> files = ImagesIn(layout.folder);
-  if (files.empty()) Fail(layout.folder, "holds no images");
-  AddImages(std::move(files), {root}, options, layout);
+  AddImages(ImagesIn(layout.folder), {root}, options, layout);
   layout.camera = FindCamera({root}, layout.notes);
   const fs::path intrinsic = root / "intrinsic" / "intrinsic_color.txt";
   if (!layout.camera && IsFile(intrinsic)) {

@@ -32,12 +32,14 @@ bool HasColourImages(const fs::path& folder) {
 Layout ListSevenScenes(const fs::path& path, const SequenceOptions& options) {
   Layout layout;
   layout.folder = path;
-  std::vector<fs::path> files = ColourImagesIn(path);
-  const fs::path first_pose = path / fs::path(files.front().stem()).replace_extension(".pose.txt");
-  AddImages(std::move(files), {path, path.parent_path()}, options, layout);
+  AddImages(ColourImagesIn(path), {path, path.parent_path()}, options, layout);
   layout.camera = FindCamera({path}, layout.notes);
   layout.ground_truth_file = FindGroundTruth(path);
-  if (!layout.ground_truth_file && IsFile(first_pose)) layout.ground_truth_file = path;
+  // frame-000000.color.png -> frame-000000.pose.txt
+  const fs::path frame = layout.entries.front().file.stem();
+  if (!layout.ground_truth_file && IsFile(path / fs::path(frame).replace_extension(".pose.txt"))) {
+    layout.ground_truth_file = path;
+  }
   return layout;
 }
 

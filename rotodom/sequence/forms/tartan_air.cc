@@ -38,9 +38,7 @@ Layout ListTartanAir(const fs::path& image_folder, const SequenceOptions& option
   const fs::path root = image_folder.parent_path();
   Layout layout;
   layout.folder = image_folder;
-  std::vector<fs::path> files = ImagesIn(image_folder);
-  if (files.empty()) Fail(image_folder, "holds no images");
-  AddImages(std::move(files), {image_folder, root}, options, layout);
+  AddImages(ImagesIn(image_folder), {image_folder, root}, options, layout);
   layout.camera = FindCamera({image_folder, root}, layout.notes);
   if (!layout.camera) {
     const bool is_second_edition =

@@ -20,9 +20,7 @@ Layout ListTumMono(const fs::path& path, const SequenceOptions& options) {
     const std::string packed = (root / "images.zip").string();
     Fail(packed, "is packed; unpack it: unzip " + packed + " -d " + layout.folder.string());
   }
-  std::vector<fs::path> files = ImagesIn(layout.folder);
-  if (files.empty()) Fail(layout.folder, "holds no images");
-  AddImages(std::move(files), {root}, options, layout);
+  AddImages(ImagesIn(layout.folder), {root}, options, layout);
   layout.camera = FindCamera({root}, layout.notes);
   layout.ground_truth_file = FindGroundTruth(root);
   if (!layout.ground_truth_file) {

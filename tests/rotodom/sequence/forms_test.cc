@@ -142,6 +142,9 @@ TEST_F(FormsTest, KittiRaw) {
   EXPECT_EQ(Find(drive + "image_02").folder.parent_path().filename(), "image_02");
   WriteText(drive + "image_00/timestamps.txt", "2011-09-26 13:02:25.964389445\n");
   EXPECT_THAT(Complaint(drive), HasSubstr("timestamps.txt: has 1 times, none for"));
+  std::filesystem::remove(folder_ / (drive + "image_00/timestamps.txt"));
+  EXPECT_TRUE(Find(drive).times_are_made_up);
+  EXPECT_THAT(Find(drive).notes, Contains(HasSubstr("timestamps.txt is missing")));
 }
 
 TEST_F(FormsTest, TumRgbdReadsListsOfOtherSystems) {
