@@ -512,6 +512,7 @@ void VideoFile::DecodeFirstFrame() {
   const auto num_before = std::count_if(pending_.begin(), pending_.end(), [&](std::int64_t time) {
     return shown != kNoTime && time < shown;
   });
+  num_left_out_ = num_before;
   if (num_before > 0) {
     notes_.push_back("the first " + CountText(num_before, "frame") +
                      " cannot be decoded without the key frame before; frames are numbered from "
@@ -626,6 +627,7 @@ void VideoFile::CountFrames() {
       }
     }
   }
+  num_announced_ -= num_left_out_;
   if (num_announced_ <= 0 || static_cast<double>(num_announced_) >= kMostFrames) {
     num_announced_ = -1;
   }

@@ -116,6 +116,7 @@ class VideoFile {
   PictureOrientation orientation_;
   cv::Size image_size_;
   std::int64_t num_announced_ = -1;
+  std::int64_t num_left_out_ = 0;  // before the first key frame
 
   // Packets read ahead to look at their timestamps.
   std::deque<FfmpegPointer<AVPacket>> packets_;

@@ -55,7 +55,7 @@ class Encoder {
     context_->framerate = {ticks_per_second, 1};
     context_->sample_aspect_ratio = {source.pixel_width, source.pixel_height};
     context_->max_b_frames = source.num_b_frames;
-    context_->gop_size = 100;
+    context_->gop_size = source.key_frame_distance;
     context_->flags |= AV_CODEC_FLAG_QSCALE | AV_CODEC_FLAG_BITEXACT;
     context_->global_quality = 2 * FF_QP2LAMBDA;
     context_->thread_count = 1;

@@ -17,6 +17,7 @@ struct TestStream {
   std::vector<std::int64_t> times;
   double fps = 10.0;  // of time 1
   int num_b_frames = 0;
+  int key_frame_distance = 100;
   int pixel_width = 1;  // of sample aspect ratio
   int pixel_height = 1;
 };

@@ -340,6 +340,35 @@ TEST_F(VideoTest, LeavesOutALastFrameThatIsCutOff) {
   EXPECT_THAT(seen.notes, ElementsAre(HasSubstr("the last frame of the file is cut off")));
 }
 
+TEST_F(VideoTest, BeginsWithTheFirstKeyFrame) {
+  TestStream stream;
+  stream.codec = "mpeg2video";
+  stream.pictures = GreyPictures(12);
+  stream.fps = 25.0;
+  stream.key_frame_distance = 4;
+  const fs::path file = Write("film.ts", {stream});
+  ASSERT_EQ(ReadVideo(file).times_s.size(), 12u);
+  // Cut where the second picture begins: a packet of 188 bytes that starts a unit of the stream.
+  const std::string bytes = BytesOf(file);
+  std::vector<std::size_t> starts;
+  for (std::size_t at = 0; at + 188 <= bytes.size(); at += 188) {
+    const bool is_video = (bytes[at + 1] & 0x1f) == 1 && bytes[at + 2] == 0;
+    if (is_video && (bytes[at + 1] & 0x40) != 0) starts.push_back(at);
+  }
+  ASSERT_EQ(starts.size(), 12u);
+  std::ofstream(file, std::ios::binary) << bytes.substr(0, starts[0]) + bytes.substr(starts[1]);
+  VideoFile video(file, 30.0);
+  const Seen seen = ReadVideo(file);
+  EXPECT_EQ(video.num_announced(), static_cast<std::int64_t>(seen.times_s.size()));
+  ASSERT_THAT(
+      seen.greys,
+      Pointwise(DoubleNear(4.0), std::vector<double>{90, 110, 130, 150, 170, 190, 210, 230}));
+  for (std::size_t k = 1; k < seen.times_s.size(); ++k) {
+    EXPECT_NEAR(seen.times_s[k] - seen.times_s[k - 1], 0.04, 1e-9);
+  }
+  EXPECT_THAT(seen.notes, ElementsAre(HasSubstr("the first 3 frames cannot be decoded")));
+}
+
 TEST_F(VideoTest, NamesAMovieWithoutItsIndex) {
   TestStream stream;
   stream.pictures = GreyPictures(4);
