@@ -15,6 +15,7 @@ extern "C" {
 #include <libavformat/avformat.h>
 #include <libavutil/imgutils.h>
 #include <libavutil/log.h>
+#include <libavutil/opt.h>
 #include <libswscale/swscale.h>
 }
 
@@ -61,6 +62,10 @@ class Encoder {
     context_->thread_count = 1;
     if ((container->oformat->flags & AVFMT_GLOBALHEADER) != 0) {
       context_->flags |= AV_CODEC_FLAG_GLOBAL_HEADER;
+    }
+    // Key frames where they are asked for, and nowhere else.
+    if (source.codec == "libx264") {
+      av_opt_set(context_->priv_data, "x264-params", "scenecut=0:log-level=-1", 0);
     }
     Check(avcodec_open2(context_, codec, nullptr), "avcodec_open2");
     Check(avcodec_parameters_from_context(stream_->codecpar, context_), "parameters");
@@ -131,6 +136,10 @@ class Encoder {
 };
 
 }  // namespace
+
+bool HasEncoder(const std::string& codec) {
+  return avcodec_find_encoder_by_name(codec.c_str()) != nullptr;
+}
 
 void WriteTestVideo(const std::filesystem::path& file, const std::vector<TestStream>& streams) {
   av_log_set_level(AV_LOG_QUIET);

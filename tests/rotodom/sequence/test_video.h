@@ -22,6 +22,8 @@ struct TestStream {
   int pixel_height = 1;
 };
 
+bool HasEncoder(const std::string& codec);
+
 /// Writes a file with these streams; its name says the container.
 void WriteTestVideo(const std::filesystem::path& file, const std::vector<TestStream>& streams);
 

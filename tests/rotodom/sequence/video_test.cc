@@ -342,7 +342,8 @@ TEST_F(VideoTest, LeavesOutALastFrameThatIsCutOff) {
 
 TEST_F(VideoTest, BeginsWithTheFirstKeyFrame) {
   TestStream stream;
-  stream.codec = "mpeg2video";
+  stream.codec = "libx264";  // FFmpeg's own codecs make something of frames without a key frame
+  if (!HasEncoder(stream.codec)) GTEST_SKIP() << "FFmpeg here has no " << stream.codec;
   stream.pictures = GreyPictures(12);
   stream.fps = 25.0;
   stream.key_frame_distance = 4;
