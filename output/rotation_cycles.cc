@@ -3,7 +3,9 @@
 #include <algorithm>
 #include <cmath>
 #include <deque>
+#include <optional>
 
+#include "rotodom/types/median.h"
 #include "rotodom/types/text_file.h"
 
 namespace rotslam {
@@ -11,9 +13,11 @@ namespace {
 
 constexpr std::size_t kMaxCycles = 3000;
 constexpr std::size_t kMaxCycleLength = 60;
-// How many times better another reading must close cycles before it is believed.
-constexpr double kMuchBetter = 3.0;
-constexpr double kWellClosedDeg = 0.5;
+// The mean of the logarithms must differ from zero by so many of its standard deviations.
+constexpr double kBeyondDoubt = 5.0;
+// Where there are few cycles, it must be so large.
+const double kMinMeanLogOfFew = std::log(5.0);
+constexpr std::size_t kFewCycles = 10;
 
 struct Step {
   std::size_t edge = 0;
@@ -122,10 +126,10 @@ std::vector<Cycle> TreeCycles(const std::vector<RelativeRotation>& edges,
   return cycles;
 }
 
-// The angle that the best tenth of the cycles close to.
-double ClosureDeg(const std::vector<RelativeRotation>& edges,
-                  const std::vector<Cycle>& cycles,
-                  const EdgeReading& reading) {
+// The angle that each cycle closes to.
+std::vector<double> ClosuresDeg(const std::vector<RelativeRotation>& edges,
+                                const std::vector<Cycle>& cycles,
+                                const EdgeReading& reading) {
   std::vector<double> angles_deg;
   angles_deg.reserve(cycles.size());
   for (const Cycle& cycle : cycles) {
@@ -136,9 +140,59 @@ double ClosureDeg(const std::vector<RelativeRotation>& edges,
     }
     angles_deg.push_back(around.AngleDeg());
   }
-  const auto tenth = static_cast<std::ptrdiff_t>(angles_deg.size() / 10);
-  std::nth_element(angles_deg.begin(), angles_deg.begin() + tenth, angles_deg.end());
-  return angles_deg[static_cast<std::size_t>(tenth)];
+  return angles_deg;
+}
+
+// Below this, noise decides how well a cycle closes: the best tenth of the cycles.
+double NoiseDeg(std::vector<double> closures_deg) {
+  constexpr double kRounding = 1e-3;
+  const auto tenth = static_cast<std::ptrdiff_t>(closures_deg.size() / 10);
+  std::nth_element(closures_deg.begin(), closures_deg.begin() + tenth, closures_deg.end());
+  return closures_deg[static_cast<std::size_t>(tenth)] + kRounding;
+}
+
+struct ReadingComparison {
+  double mean_log = 0.0;     // of `b` over `a`: positive where `a` closes better
+  bool is_certain = false;
+  double a_deg = 0.0;        // medians of the tenth of the cycles that tell most
+  double b_deg = 0.0;
+};
+
+ReadingComparison Compare(const std::vector<double>& a_deg, const std::vector<double>& b_deg) {
+  const double noise_deg = std::min(NoiseDeg(a_deg), NoiseDeg(b_deg));
+  const auto n = static_cast<double>(a_deg.size());
+  std::vector<double> logs;
+  logs.reserve(a_deg.size());
+  double sum = 0.0;
+  double sum_of_squares = 0.0;
+  for (std::size_t k = 0; k < a_deg.size(); ++k) {
+    logs.push_back(std::log((b_deg[k] + noise_deg) / (a_deg[k] + noise_deg)));
+    sum += logs.back();
+    sum_of_squares += logs.back() * logs.back();
+  }
+  ReadingComparison comparison;
+  comparison.mean_log = sum / n;
+  const double variance = std::max(0.0, sum_of_squares / n - sum / n * sum / n);
+  const bool is_significant =
+      std::abs(comparison.mean_log) > kBeyondDoubt * std::sqrt(variance / n) + 1e-6;
+  const bool is_large = std::abs(comparison.mean_log) > kMinMeanLogOfFew;
+  comparison.is_certain = a_deg.size() < kFewCycles ? is_large : is_significant;
+  const double sign = comparison.mean_log < 0.0 ? -1.0 : 1.0;
+  std::vector<std::size_t> order(logs.size());
+  for (std::size_t k = 0; k < order.size(); ++k) order[k] = k;
+  std::sort(order.begin(), order.end(), [&](std::size_t k, std::size_t l) {
+    return sign * logs[k] != sign * logs[l] ? sign * logs[k] > sign * logs[l] : k < l;
+  });
+  order.resize(order.size() / 10 + 1);
+  std::vector<double> of_a;
+  std::vector<double> of_b;
+  for (const std::size_t k : order) {
+    of_a.push_back(a_deg[k]);
+    of_b.push_back(b_deg[k]);
+  }
+  comparison.a_deg = Median(of_a);
+  comparison.b_deg = Median(of_b);
+  return comparison;
 }
 
 }  // namespace
@@ -149,6 +203,10 @@ Rotation ReadEdgeAs(const Rotation& rotation, const EdgeReading& reading) {
     const Eigen::Vector4d q = rotation.Quaternion().coeffs();
     read = Rotation(Eigen::Quaterniond(q[0], q[1], q[2], q[3]));
   }
+  if (reading.has_y_up) {
+    const Eigen::Quaterniond q = read.Quaternion();
+    read = Rotation(Eigen::Quaterniond(q.w(), q.x(), -q.y(), -q.z()));
+  }
   return reading.is_inverse ? read.Inverse() : read;
 }
 
@@ -157,37 +215,35 @@ EdgeChoice ChooseEdgeReading(const std::vector<RelativeRotation>& edges,
   EdgeChoice choice;
   const Neighbours neighbours = NeighboursOf(edges);
   std::vector<Cycle> cycles = Triangles(edges, neighbours);
-  if (cycles.size() < 10) {
-    for (Cycle& cycle : TreeCycles(edges, neighbours)) cycles.push_back(std::move(cycle));
-  }
+  for (Cycle& cycle : TreeCycles(edges, neighbours)) cycles.push_back(std::move(cycle));
   const auto taken_as = [&] { return "taken as " + readings[choice.reading].description; };
   if (cycles.empty()) {
     choice.note = taken_as() + "; there is no cycle of edges to check it";
     return choice;
   }
-  std::vector<double> closures_deg;
+  std::vector<std::vector<double>> closures_deg;
   for (const EdgeReading& reading : readings) {
-    closures_deg.push_back(ClosureDeg(edges, cycles, reading));
+    closures_deg.push_back(ClosuresDeg(edges, cycles, reading));
   }
-  const auto best = static_cast<std::size_t>(
-      std::min_element(closures_deg.begin(), closures_deg.end()) - closures_deg.begin());
-  const bool is_much_better = kMuchBetter * closures_deg[best] < closures_deg[0] &&
-                              closures_deg[0] > kWellClosedDeg;
-  if (is_much_better) choice.reading = best;
-  double other_deg = 1e9;
-  std::size_t other = choice.reading;
+  for (std::size_t k = 1; k < readings.size(); ++k) {
+    const ReadingComparison comparison = Compare(closures_deg[choice.reading], closures_deg[k]);
+    if (comparison.is_certain && comparison.mean_log < 0.0) choice.reading = k;
+  }
+  // Against the best of the others.
+  std::optional<ReadingComparison> nearest;
+  std::size_t other = 0;
   for (std::size_t k = 0; k < readings.size(); ++k) {
-    if (k == choice.reading || closures_deg[k] >= other_deg) continue;
-    other_deg = closures_deg[k];
+    if (k == choice.reading) continue;
+    const ReadingComparison comparison = Compare(closures_deg[choice.reading], closures_deg[k]);
+    if (nearest && nearest->mean_log <= comparison.mean_log) continue;
+    nearest = comparison;
     other = k;
   }
-  choice.note = taken_as() + ": cycles close to " +
-                FormatNumber("%.2g", closures_deg[choice.reading]) + " deg (best tenth)";
-  if (other == choice.reading) return choice;
-  choice.note += ", as " + readings[other].description + " to " + FormatNumber("%.2g", other_deg);
-  if (!(kMuchBetter * closures_deg[choice.reading] < other_deg)) {
-    choice.note += ", which does not tell them apart";
-  }
+  choice.note = taken_as();
+  if (!nearest) return choice;
+  choice.note += ": cycles close to " + FormatNumber("%.2g", nearest->a_deg) + " deg, as " +
+                 readings[other].description + " to " + FormatNumber("%.2g", nearest->b_deg);
+  if (!nearest->is_certain) choice.note += ", which does not tell them apart";
   return choice;
 }
 

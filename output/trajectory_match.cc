@@ -26,9 +26,6 @@ struct Reading {
   bool estimate_order = false;
   bool truth_inverse = false;  // world->camera
   bool estimate_inverse = false;
-  bool IsAsItStands() const {
-    return !truth_order && !estimate_order && !truth_inverse && !estimate_inverse;
-  }
 };
 
 // q_w first taken for q_w last, undone; the reverse turns the other way.
@@ -195,15 +192,43 @@ bool TakeTimesInOrder(Trajectory& numbered, const Trajectory& timed) {
   return true;
 }
 
-double RelativeAte(const std::vector<PosePair>& pairs) {
-  const TrajectoryMetrics metrics = [&] {
-    std::vector<PosePair> some;
-    const std::size_t stride = pairs.size() / 300 + 1;
-    for (std::size_t k = 0; k < pairs.size(); k += stride) some.push_back(pairs[k]);
-    return ComputeMetrics(some.size() < 3 ? pairs : some, {});
-  }();
-  if (!metrics.ate_m || metrics.path_length_m <= 0.0) return 1.0;
-  return *metrics.ate_m / metrics.path_length_m;
+struct PositionFit {
+  double error = 1.0;  // as a share of the path
+  double path = 0.0;
+};
+
+PositionFit FitOfPositions(const std::vector<PosePair>& pairs) {
+  std::vector<PosePair> some;
+  const std::size_t stride = pairs.size() / 300 + 1;
+  for (std::size_t k = 0; k < pairs.size(); k += stride) some.push_back(pairs[k]);
+  const TrajectoryMetrics metrics = ComputeMetrics(some.size() < 3 ? pairs : some, {});
+  if (!metrics.ate_m || !(metrics.path_length_m > 0.0)) return {1.0, metrics.path_length_m};
+  return {*metrics.ate_m / metrics.path_length_m, metrics.path_length_m};
+}
+
+// A path of camera centres is shorter than that of a world's origin seen from a camera that turns.
+bool PositionsFitBetter(const std::vector<PosePair>& a, const std::vector<PosePair>& b) {
+  constexpr double kClearlyNearer = 3.0;
+  const PositionFit fit_a = FitOfPositions(a);
+  const PositionFit fit_b = FitOfPositions(b);
+  if (kClearlyNearer * fit_a.error < fit_b.error) return true;
+  if (kClearlyNearer * fit_b.error < fit_a.error) return false;
+  return fit_a.path < fit_b.path;
+}
+
+// One file is read in another way at a time: both the other way round would be the same as another
+// choice of axes and world.
+std::vector<Reading> OtherReadings(const TrajectoryFile& truth, const TrajectoryFile& estimate) {
+  std::vector<Reading> readings = {{false, false, true, false}, {false, false, false, true}};
+  if (truth.is_order_assumed) {
+    readings.push_back({true, false, false, false});
+    readings.push_back({true, false, true, false});
+  }
+  if (estimate.is_order_assumed) {
+    readings.push_back({false, true, false, false});
+    readings.push_back({false, true, false, true});
+  }
+  return readings;
 }
 
 struct Candidate {
@@ -313,36 +338,28 @@ MatchedTrajectories MatchTrajectories(const NamedTrajectory& truth,
   const bool truth_w_last = IsReadWithWLast(truth.file);
   const bool estimate_w_last = IsReadWithWLast(estimate.file);
   std::vector<Candidate> candidates;
-  for (const bool truth_order : {false, true}) {
-    if (truth_order && !truth.file.is_order_assumed) continue;
-    for (const bool estimate_order : {false, true}) {
-      if (estimate_order && !estimate.file.is_order_assumed) continue;
-      for (const int inverse : {0, 1, 2}) {
-        const Reading reading{truth_order, estimate_order, inverse == 1, inverse == 2};
-        if (reading.IsAsItStands()) continue;
-        Candidate candidate{
-            reading, ReadPairs(matched.pairs, reading, truth_w_last, estimate_w_last), 0.0};
-        candidate.residual_deg = ResidualDeg(candidate.pairs, step);
-        if (is_far_better(candidate.residual_deg)) candidates.push_back(std::move(candidate));
-      }
-    }
+  for (const Reading& reading : OtherReadings(truth.file, estimate.file)) {
+    Candidate candidate{
+        reading, ReadPairs(matched.pairs, reading, truth_w_last, estimate_w_last), 0.0};
+    candidate.residual_deg = ResidualDeg(candidate.pairs, step);
+    if (is_far_better(candidate.residual_deg)) candidates.push_back(std::move(candidate));
   }
   const std::optional<AxesFit> axes = FitAxes(matched.pairs, step);
   const bool axes_fit = axes && is_far_better(axes->residual_deg);
   std::sort(candidates.begin(), candidates.end(), [](const Candidate& a, const Candidate& b) {
     return a.residual_deg < b.residual_deg;
   });
-  // Of readings that fit alike, the positions choose: it is then the inverse of one or the other.
+  // Readings that fit alike are the inverse of one file or the other; the positions choose.
   while (candidates.size() > 1 &&
          candidates.back().residual_deg > 2.0 * candidates.front().residual_deg + 0.05) {
     candidates.pop_back();
   }
   if (candidates.size() > 1) {
-    std::stable_sort(candidates.begin(),
-                     candidates.end(),
-                     [](const Candidate& a, const Candidate& b) {
-                       return RelativeAte(a.pairs) < RelativeAte(b.pairs);
-                     });
+    const auto best = std::min_element(
+        candidates.begin(), candidates.end(), [](const Candidate& a, const Candidate& b) {
+          return PositionsFitBetter(a.pairs, b.pairs);
+        });
+    std::iter_swap(candidates.begin(), best);
   }
   const std::string as_is_text =
       FormatNumber("%.3g", as_is_deg) + " deg as the files stand (median over " +
@@ -394,22 +411,16 @@ MatchedTrajectories MatchTrajectories(const NamedTrajectory& truth,
                             " deg without it; --align-axes takes it out");
   } else {
     // The inverse of one of them with other axes, or qw in the other place.
-    for (const bool truth_order : {false, true}) {
-      if (truth_order && !truth.file.is_order_assumed) continue;
-      for (const int inverse : {0, 1, 2}) {
-        const Reading reading{truth_order, false, inverse == 1, inverse == 2};
-        if (reading.IsAsItStands()) continue;
-        const auto fit =
-            FitAxes(ReadPairs(matched.pairs, reading, truth_w_last, estimate_w_last), step);
-        if (!fit || !is_far_better(fit->residual_deg)) continue;
-        matched.notes.push_back("relative rotations differ by " + as_is_text + ", by " +
-                                FormatNumber("%.3g", fit->residual_deg) + " deg if " +
-                                Describe(reading, truth, estimate) +
-                                " and its axes are turned by " +
-                                AxesText(fit->truth_axes_from_estimate_axes) +
-                                ": expected are camera->world poses with qx qy qz qw");
-        return matched;
-      }
+    for (const Reading& reading : OtherReadings(truth.file, estimate.file)) {
+      const auto fit =
+          FitAxes(ReadPairs(matched.pairs, reading, truth_w_last, estimate_w_last), step);
+      if (!fit || !is_far_better(fit->residual_deg)) continue;
+      matched.notes.push_back("relative rotations differ by " + as_is_text + ", by " +
+                              FormatNumber("%.3g", fit->residual_deg) + " deg if " +
+                              Describe(reading, truth, estimate) + " and its axes are turned by " +
+                              AxesText(fit->truth_axes_from_estimate_axes) +
+                              ": expected are camera->world poses with qx qy qz qw");
+      return matched;
     }
   }
   return matched;

@@ -1,4 +1,5 @@
-// 1DSfM's EGs.txt: i j, a rotation matrix by rows with R = R_i R_j^T, and a translation.
+// 1DSfM's EGs.txt: i j, a rotation matrix by rows with R = R_i R_j^T, and a translation. The
+// cameras are Bundler's: x right, y up, looking along -z.
 
 #include <array>
 
@@ -29,7 +30,8 @@ RotationList ReadOneDSfm(const RotationGraphInput& input, double sigma_rad) {
     while (!line.AtEnd()) line.Number();  // the translation
     builder.AddEdge(line, i, j, RotationOfNine(line, numbers), covariance);
   });
-  builder.ChooseReading({{"x_i = R x_j", true, false}, {"x_j = R x_i", false, false}});
+  builder.ChooseReading({{"x_i = R x_j of cameras with y up, as 1DSfM has it", true, false, true},
+                         {"x_j = R x_i of cameras with y down", false, false, false}});
   return builder.Finish("1DSfM");
 }
 

@@ -62,10 +62,10 @@ RotationList ReadPlainList(const RotationGraphInput& input, double sigma_rad) {
     builder.Note("the numbers behind the rotation are not used (" + std::to_string(num_longer) +
                  (num_longer == 1 ? " line)" : " lines)"));
   }
-  std::vector<EdgeReading> readings = {{"x_j = R x_i", false, false}, {"x_i = R x_j", true, false}};
+  std::vector<EdgeReading> readings = {{"x_j = R x_i", false, false, false}, {"x_i = R x_j", true, false, false}};
   if (has_quaternions && !has_matrices) {
-    readings.push_back({"x_j = R x_i with qw first", false, true});
-    readings.push_back({"x_i = R x_j with qw first", true, true});
+    readings.push_back({"x_j = R x_i with qw first", false, true, false});
+    readings.push_back({"x_i = R x_j with qw first", true, true, false});
   }
   builder.ChooseReading(readings);
   return builder.Finish("list of rotations");

@@ -52,10 +52,10 @@ RotationList ReadRelpose(const RotationGraphInput& input, double sigma_rad) {
     builder.AddEdge(
         line, i, j, Rotation(Eigen::Quaterniond(v[3], v[0], v[1], v[2])), covariance);
   });
-  builder.ChooseReading({{"x_2 = R x_1, qw first", false, true},
-                         {"x_1 = R x_2, qw first", true, true},
-                         {"x_2 = R x_1, qw last", false, false},
-                         {"x_1 = R x_2, qw last", true, false}});
+  builder.ChooseReading({{"x_2 = R x_1, qw first", false, true, false},
+                         {"x_1 = R x_2, qw first", true, true, false},
+                         {"x_2 = R x_1, qw last", false, false, false},
+                         {"x_1 = R x_2, qw last", true, false, false}});
   return builder.Finish("GLOMAP relative poses");
 }
 

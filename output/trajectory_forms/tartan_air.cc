@@ -36,8 +36,8 @@ TrajectoryFile ReadTartanAir(const TrajectoryInput& input,
   const std::vector<double> timestamps_s = TimesOfPoses(input, times, kept, file.notes);
   for (std::size_t k = 0; k < kept.size(); ++k) file.poses[k].timestamp_s = timestamps_s[k];
   file.has_times = times.has_value();
-  file.is_order_assumed = true;
-  if (!HasAxesOfTartanAir(input.path)) return file;
+  file.is_order_assumed = !HasAxesOfTartanAir(input.path);
+  if (file.is_order_assumed) return file;
   Eigen::Matrix3d R_ned_cam;
   R_ned_cam << 0, 0, 1, 1, 0, 0, 0, 1, 0;
   const Rotation ned_from_cam = Rotation::FromMatrix(R_ned_cam);

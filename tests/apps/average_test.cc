@@ -217,8 +217,8 @@ TEST_F(AverageTest, FormsThatPeopleBringGiveTheTruth) {
   const std::vector<std::pair<const char*, const char*>> files = {
       {"ok.g2o", "g2o"},
       {"decimalcomma.g2o", "note: its commas are taken for decimal points"},
-      {"EGs.txt", "note: taken as x_i = R x_j: cycles close to"},
-      {"relpose.txt", "note: taken as x_2 = R x_1, qw first: cycles close to"}};
+      {"EGs.txt", "note: taken as x_i = R x_j of cameras with y up, as 1DSfM has it: cycles"},
+      {"relpose.txt", "note: taken as x_2 = R x_1, qw first: cycles"}};
   for (const auto& [name, note] : files) {
     SCOPED_TRACE(name);
     const CommandResult result = Average(cases / name, Path("out.g2o"));

@@ -188,13 +188,13 @@ void ExpectRing(const RotationList& list) {
 
 TEST_F(RotationListTest, CyclesTellTheDirectionAndTheOrder) {
   const std::map<std::string, EdgeText> texts = {
-      {"x_j = R x_i:",
+      {"x_j = R x_i: cycles",
        [](int i, int j, const Rotation& R) {
          const auto& q = R.Quaternion();
          return std::to_string(i) + ' ' + std::to_string(j) +
                 Numbers({q.x(), q.y(), q.z(), q.w()}) + '\n';
        }},
-      {"x_i = R x_j:",
+      {"x_i = R x_j: cycles",
        [](int i, int j, const Rotation& R) {
          return std::to_string(i) + ' ' + std::to_string(j) + Numbers(RowsOf(R.Inverse())) + '\n';
        }},
@@ -218,20 +218,22 @@ TEST_F(RotationListTest, CyclesTellTheDirectionAndTheOrder) {
 }
 
 TEST_F(RotationListTest, OneDSfmIsReadInItsDirectionAndTheOther) {
+  // Their cameras have y up and look along -z.
   const RotationList theirs = Read(RingText([](int i, int j, const Rotation& R) {
-    return std::to_string(i) + ' ' + std::to_string(j) + Numbers(RowsOf(R.Inverse())) +
-           " 0.1 0.2 0.3\n";
+    const Rotation y_up = Rotation::Exp({M_PI, 0.0, 0.0});
+    return std::to_string(i) + ' ' + std::to_string(j) +
+           Numbers(RowsOf(y_up * R.Inverse() * y_up.Inverse())) + " 0.1 0.2 0.3\n";
   }));
   EXPECT_EQ(theirs.form, "1DSfM");
   ExpectRing(theirs);
-  EXPECT_THAT(theirs.notes, ElementsAre(HasSubstr("taken as x_i = R x_j: cycles close to")));
+  EXPECT_THAT(theirs.notes, ElementsAre(HasSubstr("taken as x_i = R x_j of cameras with y up")));
   const RotationList other = Read(RingText([](int i, int j, const Rotation& R) {
     return std::to_string(i) + ' ' + std::to_string(j) + Numbers(RowsOf(R)) + " 0.1 0.2 0.3\n";
   }));
   ExpectRing(other);
   // Two views have no cycle: the documentation of the form decides.
   const RotationList pair = Read("0 1 0 -1 0  1 0 0  0 0 1  1 0 0\n");
-  EXPECT_LT(Angle(pair.edges[0].j_from_i, Rotation::Exp({0.0, 0.0, -M_PI / 2})), 1e-9);
+  EXPECT_LT(Angle(pair.edges[0].j_from_i, Rotation::Exp({0.0, 0.0, M_PI / 2})), 1e-9);
 }
 
 TEST_F(RotationListTest, GlomapsNamesAreIds) {
