@@ -20,7 +20,7 @@ std::string Number(const char* format, double value) {
 
 }  // namespace
 
-std::string DescribeTimes(const std::vector<double>& times_s) {
+std::string DescribeTimes(const std::vector<double>& times_s, bool with_gaps) {
   if (times_s.empty()) return {};
   std::string text = Number("%.6f", times_s.front()) + " to " + Number("%.6f s", times_s.back());
   std::vector<double> intervals_s;
@@ -32,6 +32,8 @@ std::string DescribeTimes(const std::vector<double>& times_s) {
   if (intervals_s.empty()) return text;
   const double usual_s = Median(intervals_s);
   text += ", " + Number("%.4g", 1.0 / usual_s) + " a second";
+  if (num_equal > 0) text += ", " + std::to_string(num_equal) + " there twice";
+  if (!with_gaps) return text;
   int num_gaps = 0;
   std::size_t largest = 1;
   for (std::size_t k = 1; k < times_s.size(); ++k) {
@@ -44,13 +46,12 @@ std::string DescribeTimes(const std::vector<double>& times_s) {
             ", the longest " + Number("%.3g s", times_s[largest] - times_s[largest - 1]) +
             " after number " + std::to_string(largest - 1);
   }
-  if (num_equal > 0) text += ", " + std::to_string(num_equal) + " there twice";
   return text;
 }
 
 std::vector<std::string> DescribeSequence(const Sequence& sequence) {
   std::vector<std::string> lines = {"input:  " + sequence.Describe()};
-  const std::string times = DescribeTimes(sequence.timestamps_s());
+  const std::string times = DescribeTimes(sequence.timestamps_s(), sequence.is_video());
   lines.push_back("times:  " + sequence.times_source() + (times.empty() ? "" : ": " + times));
   for (const std::string& note : sequence.notes()) lines.push_back("note:   " + note);
   return lines;

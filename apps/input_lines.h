@@ -14,8 +14,9 @@ std::vector<std::string> DescribeSequence(const Sequence& sequence);
 /// The same for the camera of an input: model, numbers, where they come from.
 std::vector<std::string> DescribeCamera(const Input& input);
 
-/// One line about times: how many, from when to when, the rate, gaps and duplicates.
-/// @param times_s  ascending; empty: an empty line.
-std::string DescribeTimes(const std::vector<double>& times_s);
+/// One line about times: from when to when, the rate, duplicates and gaps.
+/// @param times_s    ascending; empty: an empty line.
+/// @param with_gaps  off where the notes of a sequence tell of them.
+std::string DescribeTimes(const std::vector<double>& times_s, bool with_gaps);
 
 }  // namespace rotslam

@@ -147,7 +147,7 @@ int InspectTrajectory(const InspectFlags& flags) {
                 length,
                 kDegFromRad * turn_rad);
   PrintLine(text);
-  PrintLine("times:  " + DescribeTimes(times_s));
+  PrintLine("times:  " + DescribeTimes(times_s, true));
   PrintNotes(file.notes);
   return 0;
 }
@@ -177,8 +177,8 @@ int Inspect(const InspectFlags& flags) {
   const bool is_file = fs::is_regular_file(reference.file, ignored);
   if (is_file && RecogniseCameraFile(reference.file)) return InspectCamera(reference);
   if (IsSequence(flags.input)) return InspectSequence(flags);
-  if (is_file && RecogniseRotationList(flags.input)) return InspectGraph(flags.input);
   if (RecogniseTrajectory(flags.input)) return InspectTrajectory(flags);
+  if (is_file && RecogniseRotationList(flags.input)) return InspectGraph(flags.input);
   // No form takes it: the reader of the likeliest one says why.
   if (is_file) return InspectCamera(reference);
   return InspectSequence(flags);
