@@ -18,12 +18,12 @@ inline void RefuseLensBeyondRadtan(const std::filesystem::path& file,
   const bool has_denominator = d[5] != 0.0 || d[6] != 0.0 || d[7] != 0.0;
   const bool is_rational = camera.model == CameraModel::kRational && has_denominator;
   if (!is_rational && camera.model != CameraModel::kFov) return;
-  throw std::runtime_error(
-      file.string() + ": is not written: " + system + " has no camera model for " +
-      (is_rational ? "a rational lens (k4 k5 k6)" : "a FOV lens (w)") +
-      "; COLMAP has: export --to colmap, let `colmap image_undistorter` take the distortion out, "
-      "and give its images and model to " +
-      system);
+  throw std::runtime_error(file.string() + ": is not written: " + system +
+                           " has no camera model for " +
+                           (is_rational ? "a rational lens (k4 k5 k6)" : "a FOV lens (w)") +
+                           "; COLMAP has: export --to colmap, let `colmap image_undistorter` take "
+                           "the distortion out, and "
+                           "run rotslam on the images and cameras that it writes");
 }
 
 /// Adds k1 to k4 of a fisheye lens, or k1, k2, p1, p2, k3 of any other, as OpenCV orders them.
