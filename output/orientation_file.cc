@@ -83,6 +83,12 @@ OrientationFile ReadOrientationFile(const std::filesystem::path& path) {
                              ", which has no times; expected a time for each orientation, or a "
                              "times.txt beside it");
   }
+  if (trajectory.first_scaled_line > 0) {
+    throw std::runtime_error(AtLine(path,
+                                    trajectory.first_scaled_line,
+                                    "the quaternion is not of length 1: its columns are qx qy qz "
+                                    "qw, unless a header says otherwise"));
+  }
   file.form = std::move(trajectory.form);
   file.notes = std::move(trajectory.notes);
   for (const StampedPose& pose : trajectory.poses) {

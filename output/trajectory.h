@@ -18,6 +18,7 @@ struct TrajectoryFile {
   // Nothing in the file says that qw is last, or first: other files may tell, see
   // output/trajectory_match.h.
   bool is_order_assumed = false;
+  int first_scaled_line = 0;  // of a quaternion whose length is not 1 to a per cent; 0: none
 };
 
 /// Reads a trajectory, camera->world, in any of the forms of output/trajectory_form.h: TUM, KITTI,

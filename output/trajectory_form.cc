@@ -270,7 +270,7 @@ void TrajectoryBuilder::Add(const TextRow& row,
     AddLost(row.line);
     return;
   }
-  if (!IsUnitLength(length) && num_scaled_++ == 0) first_scaled_line_ = row.line;
+  if (!IsUnitLength(length) && num_scaled_++ == 0) file_.first_scaled_line = row.line;
   try {
     Add(row.line, {timestamp_s, Rotation(Eigen::Quaterniond(q[3], q[0], q[1], q[2])), center});
   } catch (const std::invalid_argument& error) {
@@ -303,7 +303,7 @@ TrajectoryFile TrajectoryBuilder::Finish() {
   }
   if (num_scaled_ > 0) {
     Note(Plural(num_scaled_, "quaternion") + " of another length than 1 normalised, the first in "
-         "line " + std::to_string(first_scaled_line_));
+         "line " + std::to_string(file_.first_scaled_line));
   }
   const auto earlier = [](const auto& a, const auto& b) { return a.first < b.first; };
   std::stable_sort(lines_.begin(), lines_.end(), earlier);

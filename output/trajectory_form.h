@@ -81,7 +81,6 @@ class TrajectoryBuilder {
   int num_lost_ = 0;
   int first_lost_line_ = 0;
   int num_scaled_ = 0;
-  int first_scaled_line_ = 0;
 };
 
 /// Reads lines whose columns are known. Lines must have as many words as the first.

@@ -218,8 +218,11 @@ bool PositionsFitBetter(const std::vector<PosePair>& a, const std::vector<PosePa
 
 // One file is read in another way at a time: both the other way round would be the same as another
 // choice of axes and world.
-std::vector<Reading> OtherReadings(const TrajectoryFile& truth, const TrajectoryFile& estimate) {
-  std::vector<Reading> readings = {{false, false, true, false}, {false, false, false, true}};
+std::vector<Reading> OtherReadings(const TrajectoryFile& truth,
+                                   const TrajectoryFile& estimate,
+                                   const MatchOptions& options) {
+  std::vector<Reading> readings = {{false, false, true, false}};
+  if (!options.is_estimate_known) readings.push_back({false, false, false, true});
   if (truth.is_order_assumed) {
     readings.push_back({true, false, false, false});
     readings.push_back({true, false, true, false});
@@ -313,7 +316,7 @@ MatchedTrajectories MatchTrajectories(const NamedTrajectory& truth,
   matched.pairs = AssociatePoses(matched.ground_truth, matched.estimate, options.metrics);
   if (matched.pairs.size() < 3 && AreNumbers(truth.file) != AreNumbers(estimate.file)) {
     const bool truth_is_numbered = AreNumbers(truth.file);
-    const bool has_taken = truth_is_numbered
+    const bool has_taken = truth_is_numbered || options.is_estimate_known
                                ? TakeTimesInOrder(matched.ground_truth, matched.estimate)
                                : TakeTimesInOrder(matched.estimate, matched.ground_truth);
     if (has_taken) {
@@ -338,7 +341,7 @@ MatchedTrajectories MatchTrajectories(const NamedTrajectory& truth,
   const bool truth_w_last = IsReadWithWLast(truth.file);
   const bool estimate_w_last = IsReadWithWLast(estimate.file);
   std::vector<Candidate> candidates;
-  for (const Reading& reading : OtherReadings(truth.file, estimate.file)) {
+  for (const Reading& reading : OtherReadings(truth.file, estimate.file, options)) {
     Candidate candidate{
         reading, ReadPairs(matched.pairs, reading, truth_w_last, estimate_w_last), 0.0};
     candidate.residual_deg = ResidualDeg(candidate.pairs, step);
@@ -411,7 +414,7 @@ MatchedTrajectories MatchTrajectories(const NamedTrajectory& truth,
                             " deg without it; --align-axes takes it out");
   } else {
     // The inverse of one of them with other axes, or qw in the other place.
-    for (const Reading& reading : OtherReadings(truth.file, estimate.file)) {
+    for (const Reading& reading : OtherReadings(truth.file, estimate.file, options)) {
       const auto fit =
           FitAxes(ReadPairs(matched.pairs, reading, truth_w_last, estimate_w_last), step);
       if (!fit || !is_far_better(fit->residual_deg)) continue;

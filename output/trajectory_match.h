@@ -17,6 +17,8 @@ struct MatchOptions {
   // Takes both as they stand: nothing is inverted or put in another order.
   bool as_is = false;
   double time_offset_s = 0.0;  // added to the times of the estimate
+  // The estimate is of this program: only the truth's direction, order and times are in doubt.
+  bool is_estimate_known = false;
 };
 
 /// A trajectory and what messages call it.

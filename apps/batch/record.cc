@@ -60,6 +60,7 @@ void AddMetrics(const BatchEntry& entry,
                 BatchResult& result) {
   MatchOptions options;
   options.metrics.num_threads = num_threads;
+  options.is_estimate_known = true;
   try {
     const std::optional<fs::path> truth =
         entry.ground_truth.empty()

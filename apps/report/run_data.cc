@@ -98,6 +98,7 @@ TruthData CompareWith(const TruthSource& source,
   MatchOptions matching;
   matching.metrics = options;
   matching.align_axes = source.align_axes;
+  matching.is_estimate_known = true;
   const MatchedTrajectories matched =
       MatchTrajectories({ReadTruth(source, file), file.string()},
                         {{orientations, "rotations.csv", {}, true, false}, "the run"},

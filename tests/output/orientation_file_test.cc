@@ -73,6 +73,7 @@ TEST(OrientationFile, RefusesInOneLine) {
   const std::map<std::string, std::string> reasons = {
       {"# nothing\n", "has no orientations"},
       {"1 0 0 0 0 0 0 1\n2 0 0 0 0 0 1\n", ":2: expected 8 columns, as above, found 7"},
+      {"1 0 0 0 0 0 0 1\n2 0 0 0 0 0 0 1.5\n", ":2: the quaternion is not of length 1"},
       {"1 0 0 0 0 0 0 1.5\n", ":1: columns 5 to 8 are no quaternions of length 1"},
       {"1 0 0 0 0 1 0 0 0 0 1 0\n", "was taken for KITTI, which has no times"}};
   for (const auto& [content, reason] : reasons) {
