@@ -52,7 +52,8 @@ std::string DescribeTimes(const std::vector<double>& times_s, bool with_gaps) {
 std::vector<std::string> DescribeSequence(const Sequence& sequence) {
   std::vector<std::string> lines = {"input:  " + sequence.Describe()};
   const std::string times = DescribeTimes(sequence.timestamps_s(), sequence.is_video());
-  lines.push_back("times:  " + sequence.times_source() + (times.empty() ? "" : ": " + times));
+  const bool says_all = times.empty() || sequence.times_are_made_up();
+  lines.push_back("times:  " + sequence.times_source() + (says_all ? "" : ": " + times));
   for (const std::string& note : sequence.notes()) lines.push_back("note:   " + note);
   return lines;
 }

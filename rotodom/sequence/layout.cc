@@ -96,7 +96,6 @@ Layout FindLayout(const fs::path& path, const SequenceOptions& options) {
   const SequenceForm& form = FindSequenceForm(path);
   Layout layout = form.list(CleanPath(path), options);
   layout.form = form.name;
-  if (layout.times_are_made_up) layout.notes.push_back(MadeUpTimesNote(options.fps));
   if (!layout.times_are_made_up) NoteGaps(layout);
   return layout;
 }

@@ -430,12 +430,7 @@ std::optional<SpokenTimes> TimesOfNames(const std::vector<std::string>& stems) {
 }
 
 std::string MadeUpTimes(double fps) {
-  return "made up at " + FormatNumber("%.6g", fps) + " frames a second";
-}
-
-std::string MadeUpTimesNote(double fps) {
-  return "times are made up at " + FormatNumber("%.6g", fps) +
-         " frames a second (--fps sets the rate)";
+  return "made up at " + FormatNumber("%.6g", fps) + " frames a second (--fps sets the rate)";
 }
 
 }  // namespace rotslam

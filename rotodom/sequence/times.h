@@ -51,10 +51,7 @@ std::optional<SpokenTimes> TimesOfWords(const std::vector<std::string>& words,
 /// or `sec.nsec`, whose nanoseconds may lack leading zeros; `20260115_063000123`.
 std::optional<SpokenTimes> TimesOfNames(const std::vector<std::string>& stems);
 
-/// What Layout::times_source says of times that are made up: "made up at 30 frames a second".
+/// What Layout::times_source says of times that are made up: the rate, and what sets it.
 std::string MadeUpTimes(double fps);
-
-/// The note on them, which says what to do.
-std::string MadeUpTimesNote(double fps);
 
 }  // namespace rotslam

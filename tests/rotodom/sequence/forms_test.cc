@@ -185,7 +185,7 @@ TEST_F(FormsTest, IclNuimNumbersItsFrames) {
   EXPECT_THAT(Times(layout), ElementsAre(0.0, 1.0 / 30.0));
   EXPECT_EQ(layout.own_camera.value().fx, 481.2);
   EXPECT_EQ(layout.ground_truth_file, folder_ / "livingRoom2.gt.freiburg");
-  EXPECT_THAT(layout.notes, Contains(HasSubstr("times are made up at 30 frames a second")));
+  EXPECT_THAT(layout.times_source, HasSubstr("made up at 30 frames a second"));
 }
 
 TEST_F(FormsTest, TumMono) {

@@ -16,6 +16,7 @@ struct RealSequence {
   cv::Size size;
   double first_s;
   double second_s;
+  double last_s;
   bool brings_camera;
   bool brings_ground_truth;
 };
@@ -36,6 +37,7 @@ TEST_P(SharedData, IsRecognised) {
   EXPECT_EQ(sequence->image_size(), expected.size);
   EXPECT_NEAR(sequence->timestamps_s()[0], expected.first_s, 1e-6);
   EXPECT_NEAR(sequence->timestamps_s()[1], expected.second_s, 1e-6);
+  EXPECT_NEAR(sequence->timestamps_s().back(), expected.last_s, 1e-6);
   EXPECT_EQ(sequence->GroundTruthFile().has_value(), expected.brings_ground_truth);
   ASSERT_EQ(sequence->camera_reference().has_value(), expected.brings_camera);
   if (expected.brings_camera) {
@@ -51,13 +53,15 @@ INSTANTIATE_TEST_SUITE_P(
     Sequence,
     SharedData,
     testing::Values(
-        RealSequence{"kitti00", "KITTI odometry", 200, {1241, 376}, 0.0, 0.1037359, true, true},
+        RealSequence{
+            "kitti00", "KITTI odometry", 200, {1241, 376}, 0.0, 0.1037359, 20.63096, true, true},
         RealSequence{"tum_fr1_rpy",
                      "TUM RGB-D",
                      480,
                      {640, 480},
                      1305031229.528748,
                      1305031229.564425,
+                     1305031245.497697,
                      false,
                      true},
         RealSequence{"euroc_v101_keyframes",
@@ -66,12 +70,22 @@ INSTANTIATE_TEST_SUITE_P(
                      {752, 480},
                      1403715273.262142976,
                      1403715280.562142976,
+                     1403715408.762142976,
                      true,
                      true},
+        RealSequence{"7scenes_kitchen",
+                     "image folder",
+                     400,
+                     {640, 480},
+                     0.0,
+                     1.0 / 30.0,
+                     399 / 30.0,
+                     false,
+                     true},
         RealSequence{
-            "7scenes_kitchen", "image folder", 400, {640, 480}, 0.0, 1.0 / 30.0, false, true},
-        RealSequence{"pan720", "image folder", 361, {640, 480}, 1000.0, 1000.033333, false, true},
-        RealSequence{"cmu0", "image folder", 38, {1300, 867}, 0.0, 1.0 / 30.0, false, false}),
+            "pan720", "image folder", 361, {640, 480}, 1000.0, 1000.033333, 1012.0, false, true},
+        RealSequence{
+            "cmu0", "image folder", 38, {1300, 867}, 0.0, 1.0 / 30.0, 37 / 30.0, false, false}),
     [](const auto& test) { return "Of_" + test.param.folder; });
 
 }  // namespace
