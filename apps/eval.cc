@@ -79,8 +79,10 @@ int Eval(const EvalFlags& flags) {
   const Comparison comparison =
       CompareTrajectoryFiles(flags.ground_truth, flags.estimate, times, options);
   if (flags.json) {
-    std::printf("%s\n", MetricsJson(comparison, flags.num_images)
-                           .dump(-1, ' ', false, nlohmann::json::error_handler_t::replace).c_str());
+    std::printf("%s\n",
+                MetricsJson(comparison, flags.num_images)
+                    .dump(-1, ' ', false, nlohmann::json::error_handler_t::replace)
+                    .c_str());
   } else {
     for (const std::string& note : comparison.notes) std::printf("note: %s\n", note.c_str());
     PrintTable(comparison.metrics, flags.num_images);
@@ -93,12 +95,17 @@ int Eval(const EvalFlags& flags) {
 void AddEvalCommand(CLI::App& app, Action& action) {
   const auto flags = std::make_shared<EvalFlags>();
   CLI::App* command = app.add_subcommand(
-      "eval", "Compare a trajectory with the ground truth (TUM, KITTI, EuRoC and others in any mix)");
-  command->add_option("ground_truth", flags->ground_truth, "Ground truth, camera->world: " + TrajectoryFormNames())
+      "eval",
+      "Compare a trajectory with the ground truth (TUM, KITTI, EuRoC and others in any mix)");
+  command
+      ->add_option("ground_truth",
+                   flags->ground_truth,
+                   "Ground truth, camera->world: " + TrajectoryFormNames())
       ->required();
   command->add_option("estimate", flags->estimate, "Estimate, camera->world")->required();
-  command->add_option(
-      "--times", flags->times, "Timestamps of files without times, one a line (default: the pose number)");
+  command->add_option("--times",
+                      flags->times,
+                      "Timestamps of files without times, one a line (default: the pose number)");
   command
       ->add_option("--images", flags->num_images, "Images of the sequence, to report the coverage")
       ->check(AtLeastZero());

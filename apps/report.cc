@@ -64,9 +64,10 @@ void AddTruthFlags(CLI::App& command, TruthSource& truth) {
   command.add_option("--ground-truth",
                      truth.file,
                      "File or folder of poses, camera->world (default: the one beside the images)");
-  command.add_option("--times",
-                     truth.times,
-                     "Timestamps of a file without times, one a line (default: times.txt beside it)");
+  command.add_option(
+      "--times",
+      truth.times,
+      "Timestamps of a file without times, one a line (default: times.txt beside it)");
   command.add_flag("--align-axes",
                    truth.align_axes,
                    "Take out a constant rotation between its axes and the camera's");

@@ -29,8 +29,9 @@ struct OrientationFile {
 /// Reads orientations, camera->world: any trajectory with times that ReadTrajectoryFile reads, the
 /// positions are not looked at, or a rotations.csv as WriteRotationsCsv writes it. A file without
 /// times takes those of the times.txt beside it.
-/// Throws std::runtime_error with file, line and reason: what ReadTrajectoryFile throws; no times; a
-/// quaternion whose length is not 1 to a per cent; in a rotations.csv, a time that is there twice.
+/// Throws std::runtime_error with file, line and reason: what ReadTrajectoryFile throws; no times;
+/// a quaternion whose length is not 1 to a per cent; in a rotations.csv, a time that is there
+/// twice.
 OrientationFile ReadOrientationFile(const std::filesystem::path& path);
 
 /// The orientations alone.

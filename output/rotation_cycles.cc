@@ -152,9 +152,9 @@ double NoiseDeg(std::vector<double> closures_deg) {
 }
 
 struct ReadingComparison {
-  double mean_log = 0.0;     // of `b` over `a`: positive where `a` closes better
+  double mean_log = 0.0;  // of `b` over `a`: positive where `a` closes better
   bool is_certain = false;
-  double a_deg = 0.0;        // medians of the tenth of the cycles that tell most
+  double a_deg = 0.0;  // medians of the tenth of the cycles that tell most
   double b_deg = 0.0;
 };
 

@@ -220,7 +220,8 @@ RotationList RotationGraphBuilder::Finish(const std::string& form) {
   if (list_.edges.empty()) {
     throw std::runtime_error(path_.string() +
                              ": has no edges: neither EDGE_SE3:QUAT, nor EDGE3, nor lines with two "
-                             "ids and a rotation" + tags);
+                             "ids and a rotation" +
+                             tags);
   }
   std::vector<int> order(list_.ids.size());
   for (std::size_t k = 0; k < order.size(); ++k) order[k] = static_cast<int>(k);
@@ -248,7 +249,8 @@ RotationList RotationGraphBuilder::Finish(const std::string& form) {
   }
   const auto renumbered = [&](const auto& map) {
     std::remove_cvref_t<decltype(map)> result;
-    for (const auto& [view, value] : map) result[place[static_cast<std::size_t>(view.value)]] = value;
+    for (const auto& [view, value] : map)
+      result[place[static_cast<std::size_t>(view.value)]] = value;
     return result;
   };
   list_.cam_from_world = renumbered(list_.cam_from_world);

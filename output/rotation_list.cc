@@ -48,8 +48,7 @@ std::string PoseGraphText(const RotationList& list, const RotationMap& cam_from_
   }
   for (const FrameId view : list.fixed) text += "FIX " + ids[view.value] + '\n';
   for (const RelativeRotation& edge : list.edges) {
-    text += "EDGE_SE3:QUAT " + ids[edge.i.value] + ' ' +
-            ids[edge.j.value];
+    text += "EDGE_SE3:QUAT " + ids[edge.i.value] + ' ' + ids[edge.j.value];
     // As WriteG2o: the vertices' translation, which weighs nothing.
     const Eigen::Vector3d between =
         cam_from_world.at(edge.i) * (center_of(edge.j) - center_of(edge.i));

@@ -47,9 +47,9 @@ RotationList ReadRotationList(const std::filesystem::path& path, double sigma_ra
 std::optional<std::string> RecogniseRotationList(const std::filesystem::path& path);
 
 /// Writes a pose graph like WriteG2o, with the file's own ids and all of its edges, or, when the
-/// name ends in anything but ".g2o", a line `id qx qy qz qw` (cam_from_world) per view. A pose graph
-/// has numbers for ids: names are numbered there, and comments say which is which.
-/// Throws std::runtime_error when the file cannot be written.
+/// name ends in anything but ".g2o", a line `id qx qy qz qw` (cam_from_world) per view. A pose
+/// graph has numbers for ids: names are numbered there, and comments say which is which. Throws
+/// std::runtime_error when the file cannot be written.
 void WriteRotationList(const std::filesystem::path& path,
                        const RotationList& list,
                        const RotationMap& cam_from_world);

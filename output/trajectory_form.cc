@@ -154,9 +154,8 @@ void RequireQuaternions(const TrajectoryInput& input, const PoseColumns& columns
               " are: name them in a first line";
     break;
   }
-  throw std::runtime_error(AtLine(input.path,
-                                  input.rows.front().line,
-                                  reason + "; expected timestamp tx ty tz qx qy qz qw"));
+  throw std::runtime_error(AtLine(
+      input.path, input.rows.front().line, reason + "; expected timestamp tx ty tz qx qy qz qw"));
 }
 
 }  // namespace
@@ -165,8 +164,8 @@ bool IsMissingNumber(const std::string& word) {
   if (word.size() < 3 || word.size() > 10) return false;
   std::string name = LowerCase(word);
   if (name.front() == '-' || name.front() == '+') name.erase(0, 1);
-  return name == "nan" || name == "inf" || name == "infinity" || name == "null" ||
-         name == "none" || name == "nan(ind)";
+  return name == "nan" || name == "inf" || name == "infinity" || name == "null" || name == "none" ||
+         name == "nan(ind)";
 }
 
 TrajectoryInput ReadTrajectoryInput(const std::filesystem::path& path) {
@@ -237,8 +236,7 @@ std::optional<PoseColumns> NamedPoseColumns(const std::vector<std::string>& colu
     }
   }
   const auto is_missing = [](int column) { return column < 0; };
-  if (found.time < 0 ||
-      std::any_of(found.quaternion.begin(), found.quaternion.end(), is_missing)) {
+  if (found.time < 0 || std::any_of(found.quaternion.begin(), found.quaternion.end(), is_missing)) {
     return std::nullopt;
   }
   if (std::any_of(found.position.begin(), found.position.end(), is_missing)) {
@@ -302,8 +300,10 @@ TrajectoryFile TrajectoryBuilder::Finish() {
          " marked as lost (nan or zero), the first in line " + std::to_string(first_lost_line_));
   }
   if (num_scaled_ > 0) {
-    Note(Plural(num_scaled_, "quaternion") + " of another length than 1 normalised, the first in "
-         "line " + std::to_string(file_.first_scaled_line));
+    Note(Plural(num_scaled_, "quaternion") +
+         " of another length than 1 normalised, the first in "
+         "line " +
+         std::to_string(file_.first_scaled_line));
   }
   const auto earlier = [](const auto& a, const auto& b) { return a.first < b.first; };
   std::stable_sort(lines_.begin(), lines_.end(), earlier);
@@ -322,8 +322,8 @@ TrajectoryFile TrajectoryBuilder::Finish() {
       continue;
     }
     if (first_line == 0) first_line = lines_[k].second;
-    largest_deg = std::max(
-        largest_deg, (once.back().world_from_cam.Inverse() * pose.world_from_cam).AngleDeg());
+    largest_deg = std::max(largest_deg,
+                           (once.back().world_from_cam.Inverse() * pose.world_from_cam).AngleDeg());
   }
   const int num_again = static_cast<int>(file_.poses.size() - once.size());
   if (num_again > 0) {

@@ -65,7 +65,9 @@ class TrajectoryBuilder {
   TrajectoryBuilder(const TrajectoryInput& input, std::string form);
   /// A pose with the line that it comes from.
   void Add(int line, const StampedPose& pose);
-  void Add(const TextRow& row, double timestamp_s, const Eigen::Vector3d& center,
+  void Add(const TextRow& row,
+           double timestamp_s,
+           const Eigen::Vector3d& center,
            const Eigen::Vector4d& qx_qy_qz_qw);
   /// @param numbers  a row-major 3x4 matrix.
   void Add(int line, double timestamp_s, const std::array<double, 12>& numbers);

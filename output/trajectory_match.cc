@@ -74,16 +74,16 @@ std::vector<RelativePair> RelativePairs(const std::vector<PosePair>& pairs, std:
   for (std::size_t k = 0; k < count; k += stride) {
     const PosePair& a = pairs[k];
     const PosePair& b = pairs[k + step];
-    relative.push_back(
-        {a.ground_truth.world_from_cam.Inverse() * b.ground_truth.world_from_cam,
-         a.estimate.world_from_cam.Inverse() * b.estimate.world_from_cam});
+    relative.push_back({a.ground_truth.world_from_cam.Inverse() * b.ground_truth.world_from_cam,
+                        a.estimate.world_from_cam.Inverse() * b.estimate.world_from_cam});
   }
   return relative;
 }
 
 double MedianTurnDeg(const std::vector<PosePair>& pairs, std::size_t step) {
   std::vector<double> angles;
-  for (const RelativePair& pair : RelativePairs(pairs, step)) angles.push_back(pair.truth.AngleDeg());
+  for (const RelativePair& pair : RelativePairs(pairs, step))
+    angles.push_back(pair.truth.AngleDeg());
   return Median(std::move(angles));
 }
 
@@ -175,12 +175,12 @@ bool Overlap(const Trajectory& a, const Trajectory& b) {
   } else if (!Overlap(poses, shifted)) {
     const double apart_s = poses.front().timestamp_s - shifted.front().timestamp_s;
     reason += "the times do not overlap, truth " + Times(poses) + ", estimate " + Times(shifted) +
-              ", starts " + FormatNumber("%.3f", std::abs(apart_s)) +
-              " s apart: --time-offset " + FormatNumber("%.9g", apart_s) +
-              " would move the estimate there";
+              ", starts " + FormatNumber("%.3f", std::abs(apart_s)) + " s apart: --time-offset " +
+              FormatNumber("%.9g", apart_s) + " would move the estimate there";
   } else {
-    reason += "do the timestamps agree? KITTI files take theirs from --times; --max-gap bridges "
-              "gaps in the ground truth";
+    reason +=
+        "do the timestamps agree? KITTI files take theirs from --times; --max-gap bridges "
+        "gaps in the ground truth";
   }
   throw std::runtime_error(reason);
 }
@@ -320,10 +320,9 @@ MatchedTrajectories MatchTrajectories(const NamedTrajectory& truth,
                                ? TakeTimesInOrder(matched.ground_truth, matched.estimate)
                                : TakeTimesInOrder(matched.estimate, matched.ground_truth);
     if (has_taken) {
-      matched.notes.push_back((truth_is_numbered ? truth : estimate).name +
-                              " has no times; both have " +
-                              std::to_string(matched.estimate.size()) +
-                              " poses, which are paired in their order");
+      matched.notes.push_back(
+          (truth_is_numbered ? truth : estimate).name + " has no times; both have " +
+          std::to_string(matched.estimate.size()) + " poses, which are paired in their order");
       matched.pairs = AssociatePoses(matched.ground_truth, matched.estimate, options.metrics);
     }
   }
@@ -364,9 +363,9 @@ MatchedTrajectories MatchTrajectories(const NamedTrajectory& truth,
         });
     std::iter_swap(candidates.begin(), best);
   }
-  const std::string as_is_text =
-      FormatNumber("%.3g", as_is_deg) + " deg as the files stand (median over " +
-      std::to_string(step) + (step == 1 ? " pose)" : " poses)");
+  const std::string as_is_text = FormatNumber("%.3g", as_is_deg) +
+                                 " deg as the files stand (median over " + std::to_string(step) +
+                                 (step == 1 ? " pose)" : " poses)");
   if (!candidates.empty() && axes) {
     const Candidate& best = candidates.front();
     const std::string what = Describe(best.reading, truth, estimate);
@@ -383,14 +382,15 @@ MatchedTrajectories MatchTrajectories(const NamedTrajectory& truth,
       pose = Read(pose, best.reading.truth_order, truth_w_last, best.reading.truth_inverse);
     }
     for (StampedPose& pose : matched.estimate) {
-      pose = Read(pose, best.reading.estimate_order, estimate_w_last, best.reading.estimate_inverse);
+      pose =
+          Read(pose, best.reading.estimate_order, estimate_w_last, best.reading.estimate_inverse);
     }
     matched.pairs = AssociatePoses(matched.ground_truth, matched.estimate, options.metrics);
     return matched;
   }
   if (!candidates.empty()) {
-    matched.notes.push_back("relative rotations differ by " + as_is_text +
-                            " and fit if " + Describe(candidates.front().reading, truth, estimate) +
+    matched.notes.push_back("relative rotations differ by " + as_is_text + " and fit if " +
+                            Describe(candidates.front().reading, truth, estimate) +
                             ", but they have one axis alone, which cannot tell that from other "
                             "axes of the camera: nothing is changed");
     return matched;

@@ -62,8 +62,8 @@ RunData ReadRunData(const std::filesystem::path& run);
 
 /// Which ground truth to compare with.
 struct TruthSource {
-  std::string file;   // empty: what lies with the images, if anything does
-  std::string times;  // of a file without times; empty: the `times.txt` beside it
+  std::string file;         // empty: what lies with the images, if anything does
+  std::string times;        // of a file without times; empty: the `times.txt` beside it
   bool align_axes = false;  // as in MatchOptions
 };
 

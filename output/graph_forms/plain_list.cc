@@ -62,7 +62,8 @@ RotationList ReadPlainList(const RotationGraphInput& input, double sigma_rad) {
     builder.Note("the numbers behind the rotation are not used (" + std::to_string(num_longer) +
                  (num_longer == 1 ? " line)" : " lines)"));
   }
-  std::vector<EdgeReading> readings = {{"x_j = R x_i", false, false, false}, {"x_i = R x_j", true, false, false}};
+  std::vector<EdgeReading> readings = {{"x_j = R x_i", false, false, false},
+                                       {"x_i = R x_j", true, false, false}};
   if (has_quaternions && !has_matrices) {
     readings.push_back({"x_j = R x_i with qw first", false, true, false});
     readings.push_back({"x_i = R x_j with qw first", true, true, false});
@@ -76,10 +77,11 @@ RotationList ReadPlainList(const RotationGraphInput& input, double sigma_rad) {
 namespace forms {
 
 RotationGraphForm RotationGraphFormPlainList() {
-  return {"list of rotations",
-          "i j qx qy qz qw, or i j and a 3x3 matrix by rows; x_j = R x_i unless cycles say otherwise",
-          RecognisesPlainList,
-          ReadPlainList};
+  return {
+      "list of rotations",
+      "i j qx qy qz qw, or i j and a 3x3 matrix by rows; x_j = R x_i unless cycles say otherwise",
+      RecognisesPlainList,
+      ReadPlainList};
 }
 
 }  // namespace forms

@@ -45,12 +45,12 @@ RotationList ReadRelpose(const RotationGraphInput& input, double sigma_rad) {
     if (!line.AtEnd()) line.Fail("expected name name qw qx qy qz tx ty tz, found more numbers");
     const double length = std::sqrt(v[0] * v[0] + v[1] * v[1] + v[2] * v[2] + v[3] * v[3]);
     if (!IsUnitLength(length)) {
-      line.Fail("expected a unit quaternion qw qx qy qz behind the names, found one of another "
-                "length");
+      line.Fail(
+          "expected a unit quaternion qw qx qy qz behind the names, found one of another "
+          "length");
     }
     // Kept as the readings below expect it: the first number in the place of x.
-    builder.AddEdge(
-        line, i, j, Rotation(Eigen::Quaterniond(v[3], v[0], v[1], v[2])), covariance);
+    builder.AddEdge(line, i, j, Rotation(Eigen::Quaterniond(v[3], v[0], v[1], v[2])), covariance);
   });
   builder.ChooseReading({{"x_2 = R x_1, qw first", false, true, false},
                          {"x_1 = R x_2, qw first", true, true, false},
@@ -64,10 +64,8 @@ RotationList ReadRelpose(const RotationGraphInput& input, double sigma_rad) {
 namespace forms {
 
 RotationGraphForm RotationGraphFormRelpose() {
-  return {"GLOMAP relative poses",
-          "name name qw qx qy qz tx ty tz",
-          RecognisesRelpose,
-          ReadRelpose};
+  return {
+      "GLOMAP relative poses", "name name qw qx qy qz tx ty tz", RecognisesRelpose, ReadRelpose};
 }
 
 }  // namespace forms

@@ -11,8 +11,7 @@ namespace {
 bool RecognisesMatrixLines(const TrajectoryInput& input) {
   const std::size_t count = input.NumColumns();
   if (count == 4) return input.rows.size() >= 3;
-  return (count == 1 || count == 3) && input.rows.size() >= 4 &&
-         input.rows[1].words.size() == 4;
+  return (count == 1 || count == 3) && input.rows.size() >= 4 && input.rows[1].words.size() == 4;
 }
 
 bool IsLastRow(const TextRow& row) {
@@ -48,7 +47,8 @@ TrajectoryFile ReadMatrixLines(const TrajectoryInput& input,
       throw std::runtime_error(AtLine(input.path,
                                       row.line,
                                       "expected a row of four numbers of a 3x4 or 4x4 matrix, "
-                                      "found " + std::to_string(row.words.size())));
+                                      "found " +
+                                          std::to_string(row.words.size())));
     }
     if (num_rows == 3) {
       num_rows = 0;

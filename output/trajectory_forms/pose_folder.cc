@@ -45,12 +45,10 @@ std::vector<PoseFile> PoseFiles(const fs::path& folder) {
 }
 
 bool RecognisesPoseFolder(const TrajectoryInput& input) {
-  return input.is_folder &&
-         (fs::exists(input.path / "data.csv") || !PoseFiles(input.path).empty());
+  return input.is_folder && (fs::exists(input.path / "data.csv") || !PoseFiles(input.path).empty());
 }
 
-TrajectoryFile ReadPoseFolder(const TrajectoryInput& input,
-                              const std::optional<fs::path>& times) {
+TrajectoryFile ReadPoseFolder(const TrajectoryInput& input, const std::optional<fs::path>& times) {
   const std::vector<PoseFile> files = PoseFiles(input.path);
   if (files.empty()) return ReadTrajectoryFile(input.path / "data.csv", times);
   TrajectoryBuilder builder(input, "folder of pose files");
@@ -84,10 +82,9 @@ TrajectoryFile ReadPoseFolder(const TrajectoryInput& input,
       continue;
     }
     try {
-      builder.Add(1,
-                  {timestamps_s[k],
-                   Rotation::FromMatrix(R),
-                   Eigen::Vector3d(pose[3], pose[7], pose[11])});
+      builder.Add(
+          1,
+          {timestamps_s[k], Rotation::FromMatrix(R), Eigen::Vector3d(pose[3], pose[7], pose[11])});
     } catch (const std::invalid_argument& error) {
       throw std::runtime_error(files[k].path.string() + ": " + error.what());
     }

@@ -43,7 +43,8 @@ TrajectoryFile ReadTartanAir(const TrajectoryInput& input,
   const Rotation ned_from_cam = Rotation::FromMatrix(R_ned_cam);
   for (StampedPose& pose : file.poses) pose.world_from_cam = pose.world_from_cam * ned_from_cam;
   file.notes.push_back(
-      "its axes x forward, y right, z down, as TartanAir has them, are turned to those of a camera");
+      "its axes x forward, y right, z down, as TartanAir has them, are turned to those of a "
+      "camera");
   return file;
 }
 

@@ -54,8 +54,8 @@ TrajectoryFile ReadTum(const TrajectoryInput& input,
     columns = *named;
   } else if (input.NumColumns() == kTumColumns + 1) {
     if (LastColumnIsConstant(input)) {
-      note = "the last of its 9 columns, always " + input.rows.front().words.back() +
-             ", is not used";
+      note =
+          "the last of its 9 columns, always " + input.rows.front().words.back() + ", is not used";
     } else if (Counts(input)) {
       columns = {1, {2, 3, 4}, {5, 6, 7, 8}};
       note = "the first of its 9 columns is taken for an index";

@@ -129,7 +129,7 @@ TEST_F(RotationListTest, RefusesInOneLineWithItsNumber) {
       {edge + "0 1 1 0 0 0 1 0 0 0 2\n", ":2: the nine numbers are no rotation matrix"},
       {edge + "3 3 0 0 0 1\n", ":2: an edge from a view to itself"},
       {edge + "0 1 0 0 nan 1\n", ":2: expected a finite number, found \"nan\""},
-      {edge + "0 1x 0 0 0 1\n", ":2: expected a vertex id, found \"1x\""},
+      {edge + "0 1x 0 0 0 1\n", ":2: expected a vertex id, a whole number, found \"1x\""},
       {edge + "0 18446744073709551616 0 0 0 1\n", ":2: expected a vertex id"},
       {toro + "EDGE3 0 1 0 0\n", ":2: the line ends too early"},
       {toro + "VERTEX3 0 0 0 0 0 0 1e400\n", ":2: expected a finite number"},
@@ -246,7 +246,9 @@ TEST_F(RotationListTest, GlomapsNamesAreIds) {
   EXPECT_EQ(list.ids[0], "frame_100.jpg");
   EXPECT_EQ(list.edges.size(), 24u);
   const auto file = folder_.path() / "named.g2o";
-  WriteRotationList(file, list, {{FrameId{0}, Rotation()}, {FrameId{1}, Rotation()}});
+  RotationMap cam_from_world;
+  for (int k = 0; k < 10; ++k) cam_from_world[FrameId{k}] = Rotation();
+  WriteRotationList(file, list, cam_from_world);
   EXPECT_THAT(ReadWholeFile(file), HasSubstr("# 0 is frame_100.jpg\n"));
 }
 

@@ -33,7 +33,8 @@ NamedTrajectory Estimate() {
   const Rotation other_from_world = Rotation::Exp({1.0, 2.0, -0.5});
   int k = 0;
   for (StampedPose& pose : estimate.file.poses) {
-    const Rotation noise = Rotation::Exp({0.0005 * std::sin(3.0 * k), 0.0005 * std::cos(7.0 * k), 0});
+    const Rotation noise =
+        Rotation::Exp({0.0005 * std::sin(3.0 * k), 0.0005 * std::cos(7.0 * k), 0});
     pose.world_from_cam = other_from_world * pose.world_from_cam * noise;
     pose.center_in_world = 0.5 * (other_from_world * pose.center_in_world);
     ++k;
@@ -135,7 +136,8 @@ TEST(MatchTrajectories, PairsNumberedPosesInTheirOrder) {
     MatchTrajectories(truth, estimate, {});
     FAIL();
   } catch (const std::runtime_error& error) {
-    EXPECT_THAT(error.what(), HasSubstr("99 against 100: give the times of its poses with --times"));
+    EXPECT_THAT(error.what(),
+                HasSubstr("99 against 100: give the times of its poses with --times"));
   }
 }
 

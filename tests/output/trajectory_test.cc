@@ -173,7 +173,8 @@ TEST_F(TrajectoryForms, EurocHasNanosecondsAndWFirst) {
       "1403636579863555431,2,2,3,0.8831760866327848,0.3,0.2,0.3\n";
   const TrajectoryFile named = Read(
       "#timestamp [ns], p_RS_R_x [m], p_RS_R_y [m], p_RS_R_z [m], q_RS_w [], q_RS_x [], q_RS_y [], "
-      "q_RS_z []\n" + rows);
+      "q_RS_z []\n" +
+      rows);
   ExpectTheSame(named);
   EXPECT_EQ(named.form, "EuRoC");
   EXPECT_THAT(named.notes, testing::IsEmpty());
