@@ -252,7 +252,8 @@ TrajectoryBuilder::TrajectoryBuilder(const TrajectoryInput& input, std::string f
 }
 
 void TrajectoryBuilder::Add(int line, const StampedPose& pose) {
-  if (!std::isfinite(pose.timestamp_s) || !pose.center_in_world.allFinite()) {
+  constexpr double kLatestTime = 1e15;  // s
+  if (!(std::abs(pose.timestamp_s) < kLatestTime) || !pose.center_in_world.allFinite()) {
     throw std::runtime_error(AtLine(path_, line, "a number is out of range"));
   }
   lines_.emplace_back(pose.timestamp_s, line);
@@ -267,6 +268,9 @@ void TrajectoryBuilder::Add(const TextRow& row,
   if (length == 0.0) {
     AddLost(row.line);
     return;
+  }
+  if (!std::isfinite(length)) {
+    throw std::runtime_error(AtLine(path_, row.line, "a number of the quaternion is out of range"));
   }
   if (!IsUnitLength(length) && num_scaled_++ == 0) file_.first_scaled_line = row.line;
   try {
