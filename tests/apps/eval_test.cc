@@ -213,9 +213,7 @@ TEST(EvalCommand, ReadsTheFilesThatPeopleBring) {
     EXPECT_GE(json.at("n").get<int>(), 115);
     const std::string notes = json.contains("notes") ? json["notes"].dump() : "";
     EXPECT_THAT(notes, testing::HasSubstr(one.note));
-    if (*one.note == 0) {
-      EXPECT_EQ(notes, "");
-    }
+    EXPECT_EQ(notes.empty(), std::string(one.note).empty()) << notes;
   }
   for (const auto& entry : std::filesystem::directory_iterator(kCases)) {
     EXPECT_TRUE(named.contains(entry.path().filename())) << entry.path();
