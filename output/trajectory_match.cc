@@ -159,11 +159,16 @@ bool Overlap(const Trajectory& a, const Trajectory& b) {
 [[noreturn]] void FailToPair(const NamedTrajectory& truth,
                              const NamedTrajectory& estimate,
                              const Trajectory& shifted,
-                             std::size_t num_pairs) {
+                             std::size_t num_pairs,
+                             const MatchOptions& options) {
   const Trajectory& poses = truth.file.poses;
-  std::string reason = estimate.name + ": only " + std::to_string(num_pairs) + " of " +
-                       std::to_string(shifted.size()) + " poses have ground truth in " +
-                       truth.name + ": ";
+  const std::string count =
+      "only " + std::to_string(num_pairs) + " of " + std::to_string(shifted.size()) + " poses ";
+  // The file in front is the one in doubt.
+  std::string reason =
+      options.is_estimate_known
+          ? truth.name + ": " + count + "of " + estimate.name + " have ground truth in it: "
+          : estimate.name + ": " + count + "have ground truth in " + truth.name + ": ";
   const bool truth_is_numbered = AreNumbers(truth.file);
   const bool estimate_is_numbered = AreNumbers(estimate.file);
   if (truth_is_numbered != estimate_is_numbered) {
@@ -327,7 +332,7 @@ MatchedTrajectories MatchTrajectories(const NamedTrajectory& truth,
     }
   }
   if (matched.pairs.size() < 3) {
-    FailToPair(truth, estimate, matched.estimate, matched.pairs.size());
+    FailToPair(truth, estimate, matched.estimate, matched.pairs.size(), options);
   }
   const std::size_t step = StepWithRotation(matched.pairs);
   const double turn_deg = MedianTurnDeg(matched.pairs, step);

@@ -49,6 +49,8 @@ const std::map<Folder, std::set<Folder>> kAllowed = {
     {"krot", {"rotodom/types", "rotodom/camera"}},
     {"ba", {"rotodom/types", "rotodom/camera"}},
     {"output", {"rotodom/types", "rotodom/camera"}},
+    {"output/graph_forms", {"rotodom/types", "output"}},
+    {"output/trajectory_forms", {"rotodom/types", "output"}},
 };
 
 // Folders at the top, which may include everything below them and which nothing below includes.
