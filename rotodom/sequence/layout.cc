@@ -4,7 +4,6 @@
 #include <string_view>
 #include <system_error>
 
-#include "rotodom/sequence/bag/bag_reader.h"
 #include "rotodom/sequence/image_list.h"
 #include "rotodom/sequence/sequence_form.h"
 #include "rotodom/sequence/times.h"
@@ -57,7 +56,7 @@ void NoteGaps(Layout& layout) {
 
 const SequenceForm& FindSequenceForm(const fs::path& given) {
   std::error_code error;
-  if (!fs::exists(ParseBagReference(given).file, error)) {
+  if (!fs::exists(ParseInputReference(given).file, error)) {
     if (given.filename().string().find_first_of("%*?") != std::string::npos) {
       const fs::path folder = given.has_parent_path() ? given.parent_path() : fs::path(".");
       Fail(given, "is a pattern of names; give the folder, " + folder.string());
@@ -85,7 +84,7 @@ std::string SequenceFormNames() {
 
 bool IsSequence(const fs::path& given) {
   std::error_code error;
-  if (!fs::exists(ParseBagReference(given).file, error)) return false;
+  if (!fs::exists(ParseInputReference(given).file, error)) return false;
   const fs::path path = CleanPath(given);
   return std::any_of(SequenceForms().begin(),
                      SequenceForms().end(),
@@ -98,6 +97,18 @@ Layout FindLayout(const fs::path& path, const SequenceOptions& options) {
   layout.form = form.name;
   if (!layout.times_are_made_up) NoteGaps(layout);
   return layout;
+}
+
+InputReference ParseInputReference(const fs::path& path) {
+  std::error_code error;
+  if (fs::exists(path, error)) return {path, {}};
+  const std::string text = path.string();
+  for (std::size_t colon = text.find(':'); colon != std::string::npos;
+       colon = text.find(':', colon + 1)) {
+    const fs::path file = text.substr(0, colon);
+    if (fs::exists(file, error)) return {file, text.substr(colon + 1)};
+  }
+  return {path, {}};
 }
 
 bool NaturalLess(const std::string& a, const std::string& b) {

@@ -36,6 +36,14 @@ struct Layout {
 /// Throws std::runtime_error, with path and reason in one line.
 Layout FindLayout(const std::filesystem::path& path, const SequenceOptions& options);
 
+/// A file or folder and, after a colon, a part of it: "walk.bag:/cam0/image_raw". A path that
+/// exists as it stands has no part, nor has one none of whose beginnings exists.
+struct InputReference {
+  std::filesystem::path file;
+  std::string part;
+};
+InputReference ParseInputReference(const std::filesystem::path& path);
+
 /// Order of names in which runs of digits count as numbers: frame2 < frame10.
 bool NaturalLess(const std::string& a, const std::string& b);
 

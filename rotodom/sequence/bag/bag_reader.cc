@@ -29,6 +29,11 @@ std::size_t BagReader::AddTopic(BagTopic topic) {
   return topics_.size() - 1;
 }
 
+std::size_t BagReader::NumFirstBytes(std::uint64_t size) {
+  constexpr std::uint64_t kShortMessage = 2048;
+  return static_cast<std::size_t>(size <= kShortMessage ? size : BagEntry::kHeadSize);
+}
+
 void BagReader::AddMessage(const BagEntry& entry, std::string_view head) {
   ++topics_[entry.topic].count;
   if (!is_wanted_[entry.topic]) return;
@@ -44,6 +49,9 @@ void BagReader::AddMessage(const BagEntry& entry, std::string_view head) {
       return;
     }
     head = unpacked;
+  }
+  if (unpacked.empty() && head.size() > kept.head.size() && head.size() == entry.size) {
+    kept.checksum = std::hash<std::string_view>()(head.substr(kept.head.size()));
   }
   std::memcpy(kept.head.data(), head.data(), std::min(head.size(), kept.head.size()));
   entries_.push_back(kept);

@@ -32,6 +32,7 @@ struct BagEntry {
   std::int64_t time_ns = 0;            // when it was recorded, since 1970
   std::uint64_t size = 0;              // bytes, as they are stored
   std::array<char, kHeadSize> head{};  // the first bytes, zeros where there are fewer
+  std::uint64_t checksum = 0;          // of the bytes behind them in a short message; 0: not known
   // For the reader itself: file of a folder, chunk of the file, place in it.
   std::size_t part = 0;
   std::size_t chunk = 0;
@@ -67,6 +68,9 @@ class BagReader {
 
   // Number of the topic with this name, type and encoding, which is new or not.
   std::size_t AddTopic(BagTopic topic);
+
+  // First bytes of a message that AddMessage wants, of `size` in all: a short one's are all.
+  static std::size_t NumFirstBytes(std::uint64_t size);
 
   // Counts a message and, where its topic is wanted, keeps the entry; `head` are its first bytes.
   void AddMessage(const BagEntry& entry, std::string_view head);
@@ -109,14 +113,6 @@ std::unique_ptr<BagReader> OpenBag(const std::filesystem::path& path, const BagF
 /// Whether `path` has the name of a recording (.bag, .db3, .mcap) or is a folder of recordings and
 /// no images. Never throws.
 bool IsBagName(const std::filesystem::path& path);
-
-/// A recording and, after a colon, one of its topics: "walk.bag:/cam0/image_raw". A path that
-/// exists as it stands is a file without a topic.
-struct BagReference {
-  std::filesystem::path file;
-  std::string topic;  // empty: none was named
-};
-BagReference ParseBagReference(const std::filesystem::path& path);
 
 /// `text` with `?` in place of line breaks and other control characters, which only damage brings
 /// into names.

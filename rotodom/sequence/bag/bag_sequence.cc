@@ -191,13 +191,13 @@ std::optional<std::size_t> FirstNotLater(const std::vector<BagFrame>& frames) {
 class BagSequence : public Sequence {
  public:
   BagSequence(const Layout& layout, const SequenceOptions& options) : Sequence(layout) {
-    const BagReference reference = ParseBagReference(layout.folder);
+    const InputReference reference = ParseInputReference(layout.folder);
     place_ = image_folder_ = reference.file;
     reader_ = OpenBag(reference.file, IsTopicToRead);
     for (const std::string& note : reader_->notes()) notes_.push_back(note);
     TopicChoice choice(place_, *reader_);
     const std::size_t number =
-        reference.topic.empty() ? choice.Only(&notes_) : choice.Named(reference.topic);
+        reference.part.empty() ? choice.Only(&notes_) : choice.Named(reference.part);
     topic_ = reader_->topics()[number];
     form_ += ", topic " + topic_.name;
     std::vector<BagFrame> frames;
@@ -362,13 +362,19 @@ class BagSequence : public Sequence {
     const BagTopic& topic = topics[*found];
     const bool is_rectified = IsRectified(plain);
     std::int64_t num_other = 0;
+    std::uint64_t first_checksum = 0;
     for (const BagEntry& entry : reader_->entries()) {
       if (entry.topic != *found) continue;
+      // Most say the same but for the stamp, which the checksum leaves out.
+      if (own_camera_ && entry.checksum != 0 && entry.checksum == first_checksum) continue;
       try {
         const Camera camera =
             CameraOf(ParseRosCameraInfo(topic, reader_->Read(entry)), is_rectified);
         if (const auto problem = camera.Problem()) throw std::runtime_error(*problem);
-        if (!own_camera_) own_camera_ = camera;
+        if (!own_camera_) {
+          own_camera_ = camera;
+          first_checksum = entry.checksum;
+        }
         if (camera != *own_camera_) ++num_other;
       } catch (const std::runtime_error& error) {
         if (!own_camera_) {

@@ -134,7 +134,7 @@ std::string DecompressZstd(std::string_view packed, std::uint64_t raw_size, bool
 
 }  // namespace
 
-bool CanDecompress(std::string_view compression) {
+bool CanDecompress([[maybe_unused]] std::string_view compression) {
 #ifdef ROTSLAM_HAVE_BZIP2
   if (compression == "bz2") return true;
 #endif

@@ -186,7 +186,8 @@ class McapBag : public BagReader {
 
   void AddRecord(const McapRecords& records, std::uint64_t begin, std::uint64_t size) {
     constexpr std::uint64_t kHead = 22;  // channel, number, two times
-    ByteReader reader(records.Peek(begin, std::min(size, kHead + BagEntry::kHeadSize)));
+    const std::uint64_t first = kHead + NumFirstBytes(size - std::min(size, kHead));
+    ByteReader reader(records.Peek(begin, std::min(size, first)));
     const auto channel = reader.Read<std::uint16_t>();
     reader.Read<std::uint32_t>();
     const auto log_time = reader.Read<std::uint64_t>();

@@ -167,18 +167,4 @@ bool IsBagName(const fs::path& path) {
          });
 }
 
-BagReference ParseBagReference(const fs::path& path) {
-  std::error_code error;
-  if (fs::exists(path, error)) return {path, {}};
-  // The first colon whose left side is a recording: names of topics have slashes, not colons.
-  const std::string text = path.string();
-  for (std::size_t colon = text.find(':'); colon != std::string::npos;
-       colon = text.find(':', colon + 1)) {
-    const fs::path file = text.substr(0, colon);
-    if (!fs::exists(file, error) || !IsBagName(file)) continue;
-    return {file, text.substr(colon + 1)};
-  }
-  return {path, {}};
-}
-
 }  // namespace rotslam

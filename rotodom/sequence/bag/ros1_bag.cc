@@ -211,9 +211,7 @@ class Ros1Bag : public BagReader {
     entry.size = record.data_size;
     entry.chunk = records.chunk;
     entry.offset = record.data_offset;
-    const auto head_size =
-        static_cast<std::size_t>(std::min<std::uint64_t>(record.data_size, BagEntry::kHeadSize));
-    AddMessage(entry, records.Peek(record.data_offset, head_size));
+    AddMessage(entry, records.Peek(record.data_offset, NumFirstBytes(record.data_size)));
   }
 
   void NoteEnd(const Ros1Records& records, const std::string& reason) {

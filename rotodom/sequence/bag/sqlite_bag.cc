@@ -122,12 +122,11 @@ class SqliteBag : public BagReader {
       entry.offset = static_cast<std::uint64_t>(sqlite3_column_int64(row.get(), 0));
       std::string head;
       if (IsWanted(entry.topic)) {
-        const auto head_size = std::min<std::uint64_t>(entry.size, BagEntry::kHeadSize);
         if (!Seek(sqlite3_column_int64(row.get(), 0))) {
           ++num_unreadable_;
           continue;
         }
-        head = BytesOfBlob(head_size);
+        head = BytesOfBlob(std::min<std::uint64_t>(entry.size, NumFirstBytes(entry.size)));
       }
       AddMessage(entry, head);
     }

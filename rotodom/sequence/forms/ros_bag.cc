@@ -13,10 +13,10 @@ SequenceForm SequenceFormRosBag() {
       "topics with images one behind a colon: walk.bag:/cam0/image_raw";
   form.rank = 10;  // a data set may have its recording beside the images
   form.recognises = [](const std::filesystem::path& path) {
-    return IsBagName(ParseBagReference(path).file);
+    return IsBagName(ParseInputReference(path).file);
   };
   form.list = [](const std::filesystem::path& path, const SequenceOptions&) {
-    const std::filesystem::path file = ParseBagReference(path).file;
+    const std::filesystem::path file = ParseInputReference(path).file;
     Layout layout;
     layout.is_video = true;
     layout.folder = path;

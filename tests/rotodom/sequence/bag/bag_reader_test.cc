@@ -7,6 +7,7 @@
 #include <gtest/gtest.h>
 #include <sqlite3.h>
 
+#include "rotodom/sequence/layout.h"
 #include "tests/rotodom/sequence/bag/bag_writer.h"
 #include "tests/rotodom/sequence/scratch_folder.h"
 
@@ -200,16 +201,16 @@ TEST_F(BagReaderTest, TakesNoMemoryForLengthsThatCannotBe) {
   }
 }
 
-TEST(BagReference, CutsTheTopicOffPathsThatDoNotExist) {
+TEST(InputReference, CutsTheTopicOffPathsThatDoNotExist) {
   const fs::path folder = fs::path(testing::TempDir()) / "rotslam_bag_reference";
   fs::create_directories(folder / "colon:name");
   std::ofstream(folder / "walk.bag") << "x";
   std::ofstream(folder / "odd:/cam0.bag") << "x";
-  const auto parse = [&](const std::string& text) { return ParseBagReference(folder / text); };
+  const auto parse = [&](const std::string& text) { return ParseInputReference(folder / text); };
   EXPECT_EQ(parse("walk.bag:/cam0/image_raw").file, folder / "walk.bag");
-  EXPECT_EQ(parse("walk.bag:/cam0/image_raw").topic, "/cam0/image_raw");
-  EXPECT_EQ(parse("walk.bag:cam0").topic, "cam0");
-  EXPECT_EQ(parse("walk.bag").topic, "");
+  EXPECT_EQ(parse("walk.bag:/cam0/image_raw").part, "/cam0/image_raw");
+  EXPECT_EQ(parse("walk.bag:cam0").part, "cam0");
+  EXPECT_EQ(parse("walk.bag").part, "");
   EXPECT_EQ(parse("colon:name").file, folder / "colon:name");
   EXPECT_EQ(parse("gone.bag:/cam0").file, folder / "gone.bag:/cam0");
   fs::remove_all(folder);
