@@ -86,9 +86,9 @@ bool IsSequence(const fs::path& given) {
   std::error_code error;
   if (!fs::exists(ParseInputReference(given).file, error)) return false;
   const fs::path path = CleanPath(given);
-  return std::any_of(SequenceForms().begin(),
-                     SequenceForms().end(),
-                     [&](const SequenceForm& form) { return form.recognises(path); });
+  return std::any_of(SequenceForms().begin(), SequenceForms().end(), [&](const SequenceForm& form) {
+    return form.recognises(path);
+  });
 }
 
 Layout FindLayout(const fs::path& path, const SequenceOptions& options) {

@@ -120,7 +120,8 @@ TEST_F(GivenRotations, MustBeWellFormed) {
   };
   EXPECT_THAT(refusal("0 0 0 0 0 0 0 1\n0.1 0 0 0 0 0 0 2\n"),
               HasSubstr("given.txt:2: the quaternion is not of length 1"));
-  EXPECT_THAT(refusal("0 0 0 0 0 0 0 nan\n"), HasSubstr("given.txt: has no poses: all are marked as lost"));
+  EXPECT_THAT(refusal("0 0 0 0 0 0 0 nan\n"),
+              HasSubstr("given.txt: has no poses: all are marked as lost"));
   EXPECT_THAT(refusal("0 0 0 1\n"), HasSubstr("expected 8 columns (TUM)"));
   EXPECT_THAT(refusal("# nothing\n"), HasSubstr("given.txt: has no orientations"));
   EXPECT_THAT(refusal("1 0 0 0 0 0 0 1\n1 0 0 0 0 0 0 1\n"), HasSubstr("has no orientation for"));

@@ -131,8 +131,7 @@ TEST_F(ImageTimes, SaysWhichListsDoNotFit) {
               Contains(HasSubstr("times.txt names other images: not used")));
   EXPECT_THAT(Read("times.txt", "# nothing\n").notes, Contains(HasSubstr("is empty: not used")));
   // A table that may be about anything is not worth a word.
-  EXPECT_THAT(Read("other.csv", "t,name\n0.0,a.png\n0.1,b.png\n").notes,
-              ElementsAre());
+  EXPECT_THAT(Read("other.csv", "t,name\n0.0,a.png\n0.1,b.png\n").notes, ElementsAre());
 }
 
 TEST_F(ImageTimes, LeavesOutImagesThatAListWithNamesLeavesOut) {
