@@ -8,6 +8,7 @@
 #include <system_error>
 #include <utility>
 
+#include "rotodom/camera/camera_form.h"
 #include "rotodom/sequence/times.h"
 #include "rotodom/types/text_file.h"
 
@@ -84,12 +85,21 @@ namespace {
 
 // Names of calibration files, the likelier ones first.
 std::vector<std::string> CalibrationNames() {
-  return {"camera.yaml",     "camera.yml",       "sensor.yaml",          "calib.txt",
-          "camera.txt",      "camchain.yaml",    "calib_cam_to_cam.txt", "ost.yaml",
-          "ost.txt",         "camera_info.yaml", "calibration.yaml",     "calib.yaml",
-          "calibration.yml", "calib.yml",        "intrinsics.yaml",      "intrinsics.yml",
-          "calibration.xml", "calib.json",       "transforms.json",      "sfm_data.json",
-          "cameras.txt",     "cameras.bin"};
+  std::vector<std::string> names = {"camera.yaml", "camera.yml"};
+  for (const CameraForm& form : CameraForms()) {
+    names.insert(names.end(), form.file_names.begin(), form.file_names.end());
+  }
+  // Names that say nothing of the form.
+  names.insert(names.end(),
+               {"calibration.yaml",
+                "calib.yaml",
+                "calibration.yml",
+                "calib.yml",
+                "intrinsics.yaml",
+                "intrinsics.yml",
+                "calibration.xml",
+                "calib.json"});
+  return names;
 }
 
 }  // namespace

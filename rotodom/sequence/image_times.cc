@@ -245,7 +245,8 @@ bool MentionsImages(const fs::path& file) {
   std::array<char, 4096> buffer;
   std::ifstream stream(file, std::ios::binary);
   stream.read(buffer.data(), buffer.size());
-  const std::string text = Lower({buffer.data(), static_cast<std::size_t>(stream.gcount())});
+  const std::string text =
+      Lower(std::string_view(buffer.data(), static_cast<std::size_t>(stream.gcount())));
   for (const char* extension :
        {".png", ".jpg", ".jpeg", ".bmp", ".tif", ".pgm", ".webp", ".heic"}) {
     if (text.find(extension) != std::string::npos) return true;
