@@ -1,7 +1,6 @@
 #include "rotodom/sequence/bag/bag_reader.h"
 
 #include <algorithm>
-#include <cstring>
 #include <stdexcept>
 
 #include "rotodom/sequence/bag/decompress.h"
@@ -53,7 +52,7 @@ void BagReader::AddMessage(const BagEntry& entry, std::string_view head) {
   if (unpacked.empty() && head.size() > kept.head.size() && head.size() == entry.size) {
     kept.checksum = std::hash<std::string_view>()(head.substr(kept.head.size()));
   }
-  std::memcpy(kept.head.data(), head.data(), std::min(head.size(), kept.head.size()));
+  std::copy_n(head.begin(), std::min(head.size(), kept.head.size()), kept.head.begin());
   entries_.push_back(kept);
 }
 
