@@ -99,6 +99,10 @@ std::vector<std::string> CalibrationNames() {
                 "intrinsics.yml",
                 "calibration.xml",
                 "calib.json"});
+  // A calibration was measured; the camera of a reconstruction may be anything.
+  std::stable_partition(names.begin(), names.end(), [](const std::string& name) {
+    return !name.ends_with(".json") && !name.starts_with("cameras.");
+  });
   return names;
 }
 

@@ -178,6 +178,7 @@ TEST_F(BadInput, Cameras) {
   EXPECT_THAT(Refusal(Run(Good(), {"--camera", "/nowhere.yaml"})), HasSubstr("/nowhere.yaml: "));
   // Above its images a calibration would be found.
   const fs::path alone = folder_.path() / "alone";
+  fs::create_directories(alone);
   fs::copy(Good() / "rgb", alone / "images", fs::copy_options::recursive);
   EXPECT_THAT(Refusal(Run(alone)), AllOf(HasSubstr("no calibration"), HasSubstr("--camera FILE")));
 }
