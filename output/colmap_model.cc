@@ -130,39 +130,20 @@ class ModelBuilder {
   std::set<std::uint64_t> points_;
 };
 
-struct BinaryModel {
-  int id;
-  const char* name;
-  int num_parameters;
-};
-constexpr std::array<BinaryModel, 10> kBinaryModels = {{{0, "SIMPLE_PINHOLE", 3},
-                                                        {1, "PINHOLE", 4},
-                                                        {2, "SIMPLE_RADIAL", 4},
-                                                        {3, "RADIAL", 5},
-                                                        {4, "OPENCV", 8},
-                                                        {5, "OPENCV_FISHEYE", 8},
-                                                        {6, "FULL_OPENCV", 12},
-                                                        {7, "FOV", 5},
-                                                        {8, "SIMPLE_RADIAL_FISHEYE", 4},
-                                                        {9, "RADIAL_FISHEYE", 5}}};
-
 void ReadBinaryCameras(const fs::path& file, ModelBuilder& builder) {
   BinaryReader bytes(file);
   for (auto left = bytes.Count("cameras", 24); left > 0; --left) {
     const std::string id = std::to_string(bytes.Get<std::uint32_t>());
     const int model_id = bytes.Get<std::int32_t>();
-    const auto model =
-        std::find_if(kBinaryModels.begin(), kBinaryModels.end(), [&](const BinaryModel& candidate) {
-          return candidate.id == model_id;
-        });
-    if (model == kBinaryModels.end()) {
+    const ColmapModelId* model = FindColmapModel(model_id);
+    if (model == nullptr) {
       Fail(file,
            "camera " + id + ": its model, number " + std::to_string(model_id) +
                ", is not supported");
     }
     std::vector<std::string> words = {id, model->name};
     for (int k = 0; k < 2; ++k) words.push_back(std::to_string(bytes.Get<std::uint64_t>()));
-    for (int k = 0; k < model->num_parameters; ++k) {
+    for (std::size_t k = 0; k < model->num_parameters; ++k) {
       words.push_back(FormatNumber("%.17g", bytes.Get<double>()));
     }
     builder.AddCamera(file, words);
