@@ -318,6 +318,13 @@ class JsonEvents : public nlohmann::json_sax<nlohmann::json> {
   std::string problem_;
 };
 
+// A map in braces whose first key stands without quotes is YAML's.
+bool LooksLikeJson(std::string_view text) {
+  if (!text.starts_with('{')) return false;
+  const std::size_t first = text.find_first_not_of(" \t\r\n", 1);
+  return first == std::string_view::npos || text[first] == '"' || text[first] == '}';
+}
+
 TreeNode ParseJson(const fs::path& file, const std::string& text) {
   TreeBuilder builder;
   JsonPlace place;
@@ -405,7 +412,7 @@ void CameraDocument::Parse() const {
   try {
     if (text_[begin] == '<') {
       tree_ = ParseXml(file_, text_);
-    } else if (text_[begin] == '{') {
+    } else if (LooksLikeJson(std::string_view(text_).substr(begin))) {
       tree_ = ParseJson(file_, text_);
     } else {
       tree_ = ParseYaml(text_);

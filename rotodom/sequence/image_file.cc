@@ -206,8 +206,7 @@ void AddSample(const cv::Mat& image, std::vector<float>& sample) {
 }
 
 double QuantileOf(std::vector<float>& sample, double share) {
-  const auto place = sample.begin() + static_cast<std::ptrdiff_t>(
-                                          share * static_cast<double>(sample.size() - 1) + 0.5);
+  const auto place = sample.begin() + std::lround(share * static_cast<double>(sample.size() - 1));
   std::nth_element(sample.begin(), place, sample.end());
   return *place;
 }

@@ -240,14 +240,14 @@ fs::path ListedFiles::Find(const std::string& name) {
   if (has_drive) text.erase(0, 2);
   const fs::path listed(text);
   const bool is_absolute = text.starts_with('/');
-  const fs::path expected = is_absolute ? listed : (folders_.front() / listed).lexically_normal();
+  fs::path expected = is_absolute ? listed : (folders_.front() / listed).lexically_normal();
   std::error_code ignored;
   if (!has_drive && fs::exists(expected, ignored)) return expected;
   for (const fs::path& folder : folders_) {
     // The listed folder, and the folder itself for a path of another machine.
     const fs::path relative = is_absolute ? listed.relative_path() : listed;
     for (const fs::path& place : {(folder / relative).parent_path(), folder}) {
-      const fs::path there = (place / listed.filename()).lexically_normal();
+      fs::path there = (place / listed.filename()).lexically_normal();
       if (fs::exists(there, ignored)) {
         elsewhere_.push_back(name);
         return there;

@@ -27,6 +27,15 @@ TEST(CameraDocument, ReadsYamlAsOpenCvDoes) {
   EXPECT_EQ(root.Text("time"), "12:30:05");
 }
 
+TEST(CameraDocument, TellsYamlInBracesFromJson) {
+  const TemporaryFolder folder;
+  const CameraDocument document(folder.Write("a.yaml", "{ fx: 500,\n  data: [1, 2]}\n"));
+  EXPECT_EQ(document.root().Number("fx"), 500.0);
+  EXPECT_THAT(document.root().Numbers("data"), ElementsAre(1.0, 2.0));
+  const CameraDocument cut(folder.Write("b.json", "{\n \"fx\": 500,"));
+  EXPECT_THAT(cut.parse_problem(), HasSubstr("JSON"));
+}
+
 TEST(CameraDocument, KnowsTheLinesOfJson) {
   const TemporaryFolder folder;
   const CameraDocument document(
