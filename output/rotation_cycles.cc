@@ -222,6 +222,7 @@ EdgeChoice ChooseEdgeReading(const std::vector<RelativeRotation>& edges,
     return choice;
   }
   std::vector<std::vector<double>> closures_deg;
+  closures_deg.reserve(readings.size());
   for (const EdgeReading& reading : readings) {
     closures_deg.push_back(ClosuresDeg(edges, cycles, reading));
   }

@@ -79,8 +79,8 @@ double Seconds(const std::filesystem::path& path,
   const bool is_whole = code == std::errc() && stop == word.data() + word.size();
   if (is_whole && unit_s == kSecondsPerNanosecond) {
     constexpr std::int64_t kPerSecond = 1000000000;
-    return static_cast<double>(whole / kPerSecond) +
-           unit_s * static_cast<double>(whole % kPerSecond);
+    const std::int64_t seconds = whole / kPerSecond;
+    return static_cast<double>(seconds) + unit_s * static_cast<double>(whole % kPerSecond);
   }
   return unit_s == 1.0 ? NumberAt(path, row, column) : NumberAt(path, row, column) * unit_s;
 }

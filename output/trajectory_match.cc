@@ -298,6 +298,7 @@ std::optional<AxesFit> FitAxes(const std::vector<PosePair>& pairs, std::size_t s
     weights = RobustWeights(to, from, fit.truth_axes_from_estimate_axes);
   }
   std::vector<double> angles;
+  angles.reserve(relative.size());
   const Rotation& X = fit.truth_axes_from_estimate_axes;
   for (const RelativePair& pair : relative) {
     angles.push_back(((pair.truth * X).Inverse() * (X * pair.estimate)).AngleDeg());

@@ -53,6 +53,7 @@ TrajectoryFile ReadPoseFolder(const TrajectoryInput& input, const std::optional<
   if (files.empty()) return ReadTrajectoryFile(input.path / "data.csv", times);
   TrajectoryBuilder builder(input, "folder of pose files");
   std::vector<double> numbers;
+  numbers.reserve(files.size());
   for (const PoseFile& file : files) numbers.push_back(file.number);
   std::vector<std::string> notes;
   const std::vector<double> timestamps_s = TimesOfPoses(input, times, numbers, notes);

@@ -12,6 +12,11 @@ namespace {
 
 namespace fs = std::filesystem;
 
+std::string MustBeZero(const std::string& key, const std::string& text, const std::string& model) {
+  return key + " is " + text + ", but " + model +
+         " is supported only where it is 0; calibrate as OPENCV_FISHEYE";
+}
+
 constexpr std::array<ColmapModelId, 12> kModelIds = {{{0, "SIMPLE_PINHOLE", 3},
                                                       {1, "PINHOLE", 4},
                                                       {2, "SIMPLE_RADIAL", 4},
@@ -127,10 +132,7 @@ Camera ReadColmapCamera(const fs::path& file, const std::vector<std::string>& wo
     const double value =
         is_focal ? PositiveNumber(file, line, key, text) : FiniteNumber(file, line, key, text);
     if (must_be_zero && value != 0.0) {
-      FailAt(file,
-             line,
-             key + " is " + text + ", but " + found->name +
-                 " is supported only where it is 0; calibrate as OPENCV_FISHEYE");
+      FailAt(file, line, MustBeZero(key, text, found->name));
     }
     if (name == "f" || name == "fx") camera.fx = value;
     if (name == "f" || name == "fy") camera.fy = value;

@@ -234,7 +234,7 @@ std::vector<double> Section::Numbers(const std::string& key) const {
 std::vector<double> Section::Numbers(const std::string& key,
                                      const std::vector<std::size_t>& counts,
                                      const std::string& names) const {
-  const std::vector<double> numbers = Numbers(key);
+  std::vector<double> numbers = Numbers(key);
   if (std::find(counts.begin(), counts.end(), numbers.size()) != counts.end()) return numbers;
   std::string wanted;
   for (std::size_t k = 0; k < counts.size(); ++k) {

@@ -193,7 +193,7 @@ std::unique_ptr<Sequence> OpenSequence(const fs::path& path, const SequenceOptio
   }
   const SequenceForm& form = FindSequenceForm(path);
   Layout layout = FindLayout(path, options);
-  if (form.open != nullptr) return form.open(std::move(layout), options);
+  if (form.open != nullptr) return form.open(layout, options);
   return std::make_unique<FileSequence>(std::move(layout), options);
 }
 

@@ -22,7 +22,7 @@ struct SequenceForm {
   // What lies there; decodes nothing. Throws std::runtime_error, with path and reason in one line.
   Layout (*list)(const std::filesystem::path& path, const SequenceOptions& options) = nullptr;
   // Reads the frames of what `list` gave, where these are no image files; else nullptr.
-  std::unique_ptr<Sequence> (*open)(Layout layout, const SequenceOptions& options) = nullptr;
+  std::unique_ptr<Sequence> (*open)(const Layout& layout, const SequenceOptions& options) = nullptr;
 };
 
 /// All forms, by the names of their sources.

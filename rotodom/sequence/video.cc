@@ -16,9 +16,9 @@ namespace {
 
 class VideoSequence : public Sequence {
  public:
-  VideoSequence(Layout layout, const SequenceOptions& options)
+  VideoSequence(const Layout& layout, const SequenceOptions& options)
       : Sequence(layout), options_(options), file_(layout.folder, options.fps) {
-    place_ = image_folder_ = std::move(layout.folder);
+    place_ = image_folder_ = layout.folder;
     form_ = file_.form();
     times_source_ = file_.times_source();
     times_are_made_up_ = file_.times_are_made_up();
@@ -123,8 +123,8 @@ class VideoSequence : public Sequence {
 
 }  // namespace
 
-std::unique_ptr<Sequence> OpenVideo(Layout layout, const SequenceOptions& options) {
-  return std::make_unique<VideoSequence>(std::move(layout), options);
+std::unique_ptr<Sequence> OpenVideo(const Layout& layout, const SequenceOptions& options) {
+  return std::make_unique<VideoSequence>(layout, options);
 }
 
 }  // namespace rotslam

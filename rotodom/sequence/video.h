@@ -9,6 +9,6 @@ namespace rotslam {
 
 /// The frames of the video file `layout.folder`, upright, see VideoFile. Throws std::runtime_error,
 /// with path and reason in one line, when it cannot be read or ends before `options.first`.
-std::unique_ptr<Sequence> OpenVideo(Layout layout, const SequenceOptions& options);
+std::unique_ptr<Sequence> OpenVideo(const Layout& layout, const SequenceOptions& options);
 
 }  // namespace rotslam

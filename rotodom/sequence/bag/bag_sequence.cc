@@ -15,6 +15,7 @@
 #include "rotodom/sequence/bag/bag_reader.h"
 #include "rotodom/sequence/bag/ros_message.h"
 #include "rotodom/sequence/image_list.h"
+#include "rotodom/sequence/times.h"
 
 namespace rotslam {
 namespace {
@@ -86,12 +87,11 @@ class TopicChoice {
     const std::vector<BagTopic>& topics = reader_.topics();
     for (std::size_t k = 0; k < topics.size(); ++k) {
       if (topics[k].name != name && '/' + topics[k].name != name) continue;
-      if (!IsImageTopic(topics[k])) {
-        Fail(place_, "topic " + name + " has " + topics[k].type + ", not images" + OfImageTopics());
-      }
-      if (const std::string why = WhyNot(k); !why.empty())
-        Fail(place_, "topic " + name + " " + why);
-      return k;
+      const std::string why = IsImageTopic(topics[k])
+                                  ? WhyNot(k)
+                                  : "has " + topics[k].type + ", not images" + OfImageTopics();
+      if (why.empty()) return k;
+      Fail(place_, "topic " + name + " " + why);
     }
     Fail(place_, "has no topic " + PrintableText(name) + OfImageTopics());
   }
@@ -129,6 +129,7 @@ class TopicChoice {
                TopicList(topics));
     }
     std::vector<BagTopic> shown;
+    shown.reserve(candidates.size());
     for (const std::size_t k : candidates) shown.push_back(topics[k]);
     Fail(place_,
          "has several topics with images, " + TopicList(shown) +
@@ -176,8 +177,7 @@ struct BagFrame {
 };
 
 double SecondsOfNanoseconds(std::int64_t time_ns) {
-  constexpr std::int64_t kSecond = 1'000'000'000;
-  return static_cast<double>(time_ns / kSecond) + static_cast<double>(time_ns % kSecond) * 1e-9;
+  return SecondsFromTicks(time_ns, 1'000'000'000);
 }
 
 // Whether times increase from frame to frame; the first two that do not, otherwise.
@@ -434,7 +434,7 @@ class BagSequence : public Sequence {
 
 }  // namespace
 
-std::unique_ptr<Sequence> OpenBagSequence(Layout layout, const SequenceOptions& options) {
+std::unique_ptr<Sequence> OpenBagSequence(const Layout& layout, const SequenceOptions& options) {
   return std::make_unique<BagSequence>(layout, options);
 }
 

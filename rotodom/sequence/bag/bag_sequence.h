@@ -18,6 +18,6 @@ namespace rotslam {
 ///           "/cam0/image_raw"), for rectified pictures ("/cam0/image_rect") its matrix P.
 /// Throws std::runtime_error, with path and reason in one line, when there are no pictures, several
 /// topics with pictures, or times that do not increase.
-std::unique_ptr<Sequence> OpenBagSequence(Layout layout, const SequenceOptions& options);
+std::unique_ptr<Sequence> OpenBagSequence(const Layout& layout, const SequenceOptions& options);
 
 }  // namespace rotslam
