@@ -56,7 +56,7 @@ BundleState WithSomeTracks(const BundleState& state, int num_wanted) {
   }
   BundleState part;
   part.camera = state.camera;
-  part.has_smears = state.has_smears;
+  part.has_motion_blur = state.has_motion_blur;
   part.frames = state.frames;
   part.centers = state.centers;
   for (std::size_t t = 0; t < state.tracks.size(); ++t) {
@@ -67,7 +67,7 @@ BundleState WithSomeTracks(const BundleState& state, int num_wanted) {
 
 // Takes the cameras over from a part, and how its observations are weighed.
 void TakeCameras(const BundleState& part, int num_threads, BundleState& state) {
-  state.has_smears = part.has_smears;
+  state.has_motion_blur = part.has_motion_blur;
   state.frames = part.frames;
   state.centers = part.centers;
   if (part.camera != state.camera) SetCamera(part.camera, num_threads, state);
@@ -132,7 +132,7 @@ class Rounds {
     constexpr double kEasier = 10.0;
     if (!good_ || !round.enabled) return;
     last_ = round;
-    for (int k = 0; k < options_.max_close_rounds && good_; ++k) {
+    for (int k = 0; k < options_.max_final_rounds && good_; ++k) {
       const auto start = std::chrono::steady_clock::now();
       const std::vector<bool> before = UsedFlags(state);
       ClassifyAll(round, k == 0 ? placement : Placement::kNearby, options_, state);
@@ -346,7 +346,7 @@ BundleResult RefineBundle(const BundleProblem& problem,
   BundleState& preparing = part ? *part : state;
   rounds.Run("bridge", options.bridge, preparing);
   rounds.Run("coarse", options.coarse, preparing);
-  preparing.has_smears = ShowsSmears(preparing);
+  preparing.has_motion_blur = ShowsMotionBlur(preparing);
   rounds.TryLens(options.coarse, preparing);
   rounds.Run("fine", rounds.FineFor(preparing), preparing);
   // What support is asked of.
@@ -380,7 +380,7 @@ BundleResult RefineBundle(const BundleProblem& problem,
     summary.support = SupportWithin(options.fine, options, given ? *given : state);
     ClassifyAll(rounds.last(), Placement::kStays, options, state);
     summary.after = Statistics(state);
-    summary.has_smears = state.has_smears;
+    summary.has_motion_blur = state.has_motion_blur;
     rounds.FindCovariances(options.fine, state);
     TakeResult(problem, state, result);
     result.message = summary.rounds.back().termination;

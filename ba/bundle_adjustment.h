@@ -103,8 +103,8 @@ struct BundleSummary {
   int num_completed = 0;             // observations that completion has added
   int num_dropped_tracks = 0;        // of the tracks given
   int num_dropped_observations = 0;  // of those given or added, dropped tracks' included
-  // Whether keypoints turned out less certain along their smears, and counted so.
-  bool has_smears = false;
+  // Whether keypoints turned out less certain along their blurs, and counted so.
+  bool has_motion_blur = false;
   double lens_gain = 0.0;     // share of the cost that another lens took off, see LensOptions
   bool lens_refined = false;  // whether that was enough
   std::optional<LensSigmas> lens_sigmas;  // where it was, with `options.find_covariance`

@@ -40,9 +40,9 @@ std::optional<std::string> BundleOptions::Problem() const {
   }
   if (!(loss_spreads >= 0.0)) return OutOfRange("loss_spreads", loss_spreads, "at least 0");
   if (!(limit_spreads >= 0.0)) return OutOfRange("limit_spreads", limit_spreads, "at least 0");
-  if (!(smear_s_per_px >= 0.0)) return OutOfRange("smear_s_per_px", smear_s_per_px, "at least 0");
-  if (max_close_rounds < 1) {
-    return OutOfRange("max_close_rounds", max_close_rounds, "at least 1");
+  if (!(blur_s_per_px >= 0.0)) return OutOfRange("blur_s_per_px", blur_s_per_px, "at least 0");
+  if (max_final_rounds < 1) {
+    return OutOfRange("max_final_rounds", max_final_rounds, "at least 1");
   }
   if (!(max_changed_share >= 0.0)) {
     return OutOfRange("max_changed_share", max_changed_share, "at least 0");

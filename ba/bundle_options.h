@@ -95,7 +95,7 @@ struct BundleOptions {
   // What is within 4 px of the bridge, rotations free.
   BundleRound coarse = {.max_error_px = 4.0};
   // What is within 2 px of that. Steps are Gauss-Newton's nearly from the start: damping holds back
-  // what little there is left to mend, the long waves in which a way bends.
+  // what little there is left to correct, the long waves in which a way bends.
   BundleRound fine = {
       .max_error_px = 2.0, .max_iterations = 50, .initial_radius = 1e8, .function_tolerance = 1e-5};
   // What comes before closing takes tracks at random until every frame has so many observations:
@@ -114,15 +114,15 @@ struct BundleOptions {
   // 1.4 % off the cost of KITTI 00, with 2 and 6 spreads 3.8 %. 0: as the round has it.
   double loss_spreads = 3.0;
   double limit_spreads = 5.0;
-  // While a frame is exposed it turns, and what it sees is smeared along the motion: there its
-  // keypoints are less certain than across, by hypot(1, smear), which is this times the speed of
+  // While a frame is exposed it turns, and what it sees is blurred along the motion: there its
+  // keypoints are less certain than across, by hypot(1, blur), which is this times the speed of
   // the image, px/s. Where the coarse round's residuals clearly show that it counts from then on.
-  // Most likely by those of TUM fr1_rpy: 0.002, up to a smear of 1.4. 0: as certain in all
+  // Most likely by those of TUM fr1_rpy: 0.002, up to a blur of 1.4. 0: as certain in all
   // directions.
-  double smear_s_per_px = 0.002;
+  double blur_s_per_px = 0.002;
   // Closing is repeated, so many times at most, until classification changes less than this share
   // of the observations: then the result does not depend on where it started.
-  int max_close_rounds = 5;
+  int max_final_rounds = 5;
   double max_changed_share = 5e-4;
   // false holds the rotations in every round: they come out bit by bit as they went in.
   bool refine_rotations = true;
@@ -161,8 +161,8 @@ struct BundleOptions {
     visit("preparing_observations", preparing_observations);
     visit("loss_spreads", loss_spreads);
     visit("limit_spreads", limit_spreads);
-    visit("smear_s_per_px", smear_s_per_px);
-    visit("max_close_rounds", max_close_rounds);
+    visit("blur_s_per_px", blur_s_per_px);
+    visit("max_final_rounds", max_final_rounds);
     visit("max_changed_share", max_changed_share);
     visit("refine_rotations", refine_rotations);
     visit("lens", lens);

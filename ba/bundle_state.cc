@@ -156,8 +156,8 @@ void ReplaceTracks(std::vector<Track> tracks, int num_threads, BundleState& stat
 
 Eigen::Matrix2d ScaleOf(const BundleState& state, const Sight& sight) {
   const Observation& observation = *sight.observation;
-  if (!state.has_smears) return Eigen::Matrix2d::Identity() / observation.sigma_px;
-  return Unsmearing(observation.smear) / observation.sigma_px;
+  if (!state.has_motion_blur) return Eigen::Matrix2d::Identity() / observation.sigma_px;
+  return Deblurring(observation.blur) / observation.sigma_px;
 }
 
 void SetCamera(const Camera& camera, int num_threads, BundleState& state) {

@@ -46,8 +46,8 @@ struct BundleState {
   std::vector<FrameState> frames;
   std::vector<Eigen::Vector3d> centers;
   std::vector<TrackState> tracks;
-  // Whether keypoints are less certain along their smears.
-  bool has_smears = false;
+  // Whether keypoints are less certain along their blurs.
+  bool has_motion_blur = false;
   // Where tracks are that are not the problem's any more.
   std::shared_ptr<const std::vector<Track>> replaced;
 };

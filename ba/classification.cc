@@ -56,7 +56,7 @@ class Measure {
 
   // Length of an error, in sigmas.
   double Residual(const Sight& sight, const Eigen::Vector2d& error_px) const {
-    if (!state_.has_smears) return error_px.norm() / sight.observation->sigma_px;
+    if (!state_.has_motion_blur) return error_px.norm() / sight.observation->sigma_px;
     return (ScaleOf(state_, sight) * error_px).norm();
   }
 
@@ -389,36 +389,36 @@ double ResidualSpread(const BundleState& state) {
   return *middle * std::sqrt(measured / (measured - static_cast<double>(num_free)));
 }
 
-bool ShowsSmears(const BundleState& state) {
+bool ShowsMotionBlur(const BundleState& state) {
   // In nats for each observation. TUM fr1_rpy and parts of it 0.024 to 0.10, the 7-Scenes kitchen
   // and KITTI 00 0.002, where nothing is gained, sharp renderings -0.06 to 0.006.
   constexpr double kLeastEvidence = 0.015;
   // Shorter ones say nothing.
-  constexpr double kLeastSmear = 0.05;
+  constexpr double kLeastBlur = 0.05;
   constexpr int kLeastSights = 200;
   const Measure measure(state);
   int count = 0;
   double plain_sum = 0.0;
-  double unsmeared_sum = 0.0;
+  double sharp_sum = 0.0;
   double sum_of_logs = 0.0;
   ForEachUsedSight(state, [&](const TrackState& track, const Sight& sight) {
-    const Eigen::Vector2d smear = sight.observation->smear.cast<double>();
-    const double length = smear.norm();
-    if (!(length > kLeastSmear)) return;
+    const Eigen::Vector2d blur = sight.observation->blur.cast<double>();
+    const double length = blur.norm();
+    if (!(length > kLeastBlur)) return;
     const auto error_px = measure.ErrorPx(track, sight, track.position);
     if (!error_px) return;
     const Eigen::Vector2d residual = *error_px / sight.observation->sigma_px;
-    const double along = std::abs(residual.dot(smear)) / length;
-    const double across = std::abs(residual.x() * smear.y() - residual.y() * smear.x()) / length;
+    const double along = std::abs(residual.dot(blur)) / length;
+    const double across = std::abs(residual.x() * blur.y() - residual.y() * blur.x()) / length;
     const double longer = std::hypot(1.0, length);
     ++count;
     plain_sum += along + across;
-    unsmeared_sum += along / longer + across;
+    sharp_sum += along / longer + across;
     sum_of_logs += std::log(longer);
   });
   if (count < kLeastSights || !(plain_sum > 0.0)) return false;
   // Two coordinates each, of the mean that is most likely.
-  return -sum_of_logs / count - 2.0 * std::log(unsmeared_sum / plain_sum) > kLeastEvidence;
+  return -sum_of_logs / count - 2.0 * std::log(sharp_sum / plain_sum) > kLeastEvidence;
 }
 
 BundleSupport SupportWithin(const BundleRound& round,

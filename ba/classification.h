@@ -27,10 +27,10 @@ void ClassifyAll(const BundleRound& round,
 /// less three (a point) or two (a direction) to a track. 0 where there are none.
 double ResidualSpread(const BundleState& state);
 
-/// Whether the used observations err along their smears as much more than across as these say:
+/// Whether the used observations err along their blurs as much more than across as these say:
 /// whether that is clearly likelier than that they err alike, by Laplace's distribution with its
 /// width fitted to either.
-bool ShowsSmears(const BundleState& state);
+bool ShowsMotionBlur(const BundleState& state);
 
 /// What the points explain within the round's limit, the cameras standing where they stand.
 BundleSupport SupportWithin(const BundleRound& round,

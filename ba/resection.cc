@@ -65,8 +65,8 @@ class Resection {
 
   // Sigmas per pixel.
   Eigen::Matrix2d ScaleOf(const PointSighting& sighting) const {
-    if (!options_.has_smears) return Eigen::Matrix2d::Identity() / sighting.sigma_px;
-    return Unsmearing(sighting.smear) / sighting.sigma_px;
+    if (!options_.has_motion_blur) return Eigen::Matrix2d::Identity() / sighting.sigma_px;
+    return Deblurring(sighting.blur) / sighting.sigma_px;
   }
 
   // Residual in sigmas; what does not project is far off.

@@ -16,7 +16,7 @@ struct PointSighting {
   Eigen::Vector3d point_in_world;
   Eigen::Vector2d keypoint_px;
   double sigma_px = 1.0;  // standard deviation of the keypoint, per image axis
-  Eigen::Vector2f smear = Eigen::Vector2f::Zero();  // as of Observation
+  Eigen::Vector2f blur = Eigen::Vector2f::Zero();  // as of Observation
 };
 
 /// Where a frame is thought to be before it is resected.
@@ -35,8 +35,8 @@ struct ResectionOptions {
   // frame inside a pure rotation.
   bool refine_rotation = true;
   bool refine_center = true;
-  // Whether sightings are less certain along their smears. Bundle adjustment finds out.
-  bool has_smears = false;
+  // Whether sightings are less certain along their blurs. Bundle adjustment finds out.
+  bool has_motion_blur = false;
   // Residual, in sigmas, around which Geman-McClure's weight 1 / (1 + r^2 / scale^2)^2 falls off.
   // The scale comes down to it from the median residual at the start, halving each time.
   double loss_scale = 3.0;

@@ -30,7 +30,7 @@ if(CMAKE_SYSTEM_PROCESSOR MATCHES "x86_64|AMD64")
 endif()
 
 # rotslam_add_library(<name> SOURCES ... [PUBLIC ...] [PRIVATE ...])
-# Defines rotslam_<name>, exported as rotslam::<name>; includes carry the folder ("krot/bisection.h").
+# Defines rotslam_<name>, exported as rotslam::<name>; includes carry the folder ("krot/bracket/bisection.h").
 function(rotslam_add_library name)
   cmake_parse_arguments(ARG "" "" "SOURCES;PUBLIC;PRIVATE" ${ARGN})
   add_library(rotslam_${name} STATIC ${ARG_SOURCES})

@@ -6,12 +6,12 @@
 #include <set>
 #include <utility>
 
-#include "krot/blocks.h"
-#include "krot/global_positioning.h"
-#include "krot/growth.h"
+#include "krot/initialisation/global_positioning.h"
+#include "krot/initialisation/register_views.h"
+#include "krot/initialisation/robust_triangulation.h"
+#include "krot/initialisation/selection.h"
 #include "krot/named_problem.h"
-#include "krot/robust_triangulation.h"
-#include "krot/selection.h"
+#include "krot/structure/blocks.h"
 
 namespace rotslam {
 namespace {
@@ -149,7 +149,7 @@ std::optional<ComponentStart> StartComponent(const RotationMap& cam_from_world,
           ? SolveInBlocks(cam_from_world, tracks, component, component_options, options, units)
           : SolveSelected(cam_from_world, TracksOf(members, tracks, units.min_z), options, units);
   if (!start || start->centers.size() == component.views.size()) return start;
-  GrowthOptions growth;
+  RegistrationOptions growth;
   growth.resection.threshold_rad = units.loose_rad;
   growth.resection.seed = options.seed;
   growth.min_angle_rad = units.lp_parallax_rad;
@@ -157,7 +157,7 @@ std::optional<ComponentStart> StartComponent(const RotationMap& cam_from_world,
   const auto member_tracks = RestrictTracks(
       tracks, [&](const Observation& observation) { return members.contains(observation.frame); });
   const std::size_t before = start->centers.size();
-  PlaceViews(cam_from_world, member_tracks, component.views, growth, start->centers);
+  RegisterViews(cam_from_world, member_tracks, component.views, growth, start->centers);
   start->num_grown_views = static_cast<int>(start->centers.size() - before);
   return start;
 }

@@ -3,8 +3,8 @@
 #include <optional>
 #include <vector>
 
-#include "krot/components.h"
 #include "krot/krot_options.h"
+#include "krot/structure/components.h"
 #include "rotodom/types/maps.h"
 #include "rotodom/types/track.h"
 

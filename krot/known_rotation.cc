@@ -11,11 +11,11 @@
 #include <utility>
 
 #include "krot/component_start.h"
-#include "krot/components.h"
-#include "krot/epipolar_filter.h"
-#include "krot/minimax_problem.h"
+#include "krot/initialisation/epipolar_filter.h"
+#include "krot/initialisation/selection.h"
 #include "krot/named_problem.h"
-#include "krot/selection.h"
+#include "krot/structure/components.h"
+#include "krot/structure/minimax_problem.h"
 #include "krot/track_points.h"
 #include "rotodom/types/median.h"
 #include "rotodom/types/stopwatch.h"

@@ -5,7 +5,7 @@
 #include <vector>
 
 #include "krot/krot_options.h"
-#include "krot/lp.h"
+#include "krot/lp/lp.h"
 #include "rotodom/camera/camera.h"
 #include "rotodom/types/maps.h"
 #include "rotodom/types/track.h"

@@ -4,8 +4,8 @@
 #include <optional>
 #include <string>
 
-#include "krot/bisection.h"
-#include "krot/robust_start.h"
+#include "krot/bracket/bisection.h"
+#include "krot/initialisation/robust_start.h"
 #include "rotodom/camera/camera.h"
 
 namespace rotslam {

@@ -2,7 +2,7 @@
 
 #include <vector>
 
-#include "krot/minimax_problem.h"
+#include "krot/structure/minimax_problem.h"
 #include "rotodom/types/ids.h"
 #include "rotodom/types/maps.h"
 #include "rotodom/types/track.h"

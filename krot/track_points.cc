@@ -7,8 +7,8 @@
 #include <string>
 #include <utility>
 
-#include "krot/growth.h"
-#include "krot/robust_triangulation.h"
+#include "krot/initialisation/register_views.h"
+#include "krot/initialisation/robust_triangulation.h"
 #include "rotodom/types/parallel.h"
 
 namespace rotslam {

@@ -6,8 +6,8 @@
 #include <stdexcept>
 #include <utility>
 
+#include "krot/initialisation/selection.h"
 #include "krot/named_problem.h"
-#include "krot/selection.h"
 #include "krot/track_points.h"
 #include "rotodom/types/stopwatch.h"
 

@@ -4,8 +4,8 @@
 #include <iterator>
 #include <stdexcept>
 
-#include "rotodom/tracking/blur.h"
-#include "rotodom/tracking/smear.h"
+#include "rotodom/motion_blur/blurred_patch.h"
+#include "rotodom/motion_blur/keypoint_blur.h"
 #include "rotodom/types/options.h"
 #include "rotodom/types/stopwatch.h"
 
@@ -15,25 +15,26 @@ namespace {
 // Two measurements of one rotation, the rougher by unrefined corners, differ by less.
 constexpr double kSameRotationDeg = 3.0;
 
-const Connection* BestOf(const std::vector<Connection>& connections) {
-  const auto best = std::max_element(
-      connections.begin(), connections.end(), [](const Connection& a, const Connection& b) {
-        return a.edge.num_inliers < b.edge.num_inliers;
-      });
+const EdgeWithMatches* BestOf(const std::vector<EdgeWithMatches>& connections) {
+  const auto best = std::max_element(connections.begin(),
+                                     connections.end(),
+                                     [](const EdgeWithMatches& a, const EdgeWithMatches& b) {
+                                       return a.edge.num_inliers < b.edge.num_inliers;
+                                     });
   return best == connections.end() ? nullptr : &*best;
 }
 
 // Whether enough of the points that both views show agree on the edge.
-bool IsBelieved(const Connection& connection, double min_inlier_ratio) {
+bool IsBelieved(const EdgeWithMatches& connection, double min_inlier_ratio) {
   const double num_common =
       connection.edge.num_inliers + static_cast<double>(connection.outliers_j.size());
   return connection.edge.num_inliers > min_inlier_ratio * num_common;
 }
 
 // A point that more edges refute than confirm is followed no longer.
-void MarkLostPoints(const std::vector<Connection>& connections, View& view) {
+void MarkLostPoints(const std::vector<EdgeWithMatches>& connections, View& view) {
   std::vector<int> votes(view.features.size(), 0);
-  for (const Connection& connection : connections) {
+  for (const EdgeWithMatches& connection : connections) {
     for (const auto& [i, j] : connection.matches.pairs) ++votes[j];
     for (const int j : connection.outliers_j) --votes[j];
   }
@@ -102,7 +103,7 @@ FrameEstimate RotationalOdometry::AddFrame(FrameId frame,
     timestamps_s_[frame] = timestamp_s;
     AverageWindow(estimate);
     UpdateCovariance(estimate);
-    Forget();
+    DropOldViews();
     return estimate;
   }
 
@@ -120,25 +121,25 @@ FrameEstimate RotationalOdometry::AddFrame(FrameId frame,
                               ExposureToMatch(),
                               options_.features.max_features};
   const TrackingResult tracked = Track(recent, target, estimate);
-  CarryOn(tracked, recent, *view);
+  AppendTracked(tracked, recent, *view);
   estimate.report.num_tracked = view->features.size();
   DetectNewFeatures(image, *view);
 
   cam_from_world_[frame] = tracked.cam_from_world;
   timestamps_s_[frame] = timestamp_s;
-  if (camera_.readout_s > 0.0) TakeOutShutters(*view, estimate);
+  if (camera_.readout_s > 0.0) CorrectRollingShutters(*view, estimate);
   Connect(*view, estimate);
   MarkLostPoints(estimate.connections, *view);
-  KeepGoodConnections(estimate);
+  KeepGoodEdges(estimate);
   AverageWindow(estimate);
   UpdateCovariance(estimate);
   MeasureExposure();
-  Forget();
+  DropOldViews();
   UpdateFlow(tracked, recent, *view);
 
   estimate.features = view->features;
   if (camera_.readout_s > 0.0) MoveToBearings(camera_, estimate.features);
-  Remember(view);
+  UpdateKeyframes(view);
   return estimate;
 }
 
@@ -256,9 +257,9 @@ RotationalOdometry::Agreement RotationalOdometry::AgreementOf(
   return most;
 }
 
-void RotationalOdometry::CarryOn(const TrackingResult& tracked,
-                                 const std::vector<OrientedView>& views,
-                                 View& view) const {
+void RotationalOdometry::AppendTracked(const TrackingResult& tracked,
+                                       const std::vector<OrientedView>& views,
+                                       View& view) const {
   Features& features = view.features;
   for (const TrackedPoint& point : tracked.points) {
     const auto bearing = camera_.Unproject(point.keypoint_px);
@@ -286,16 +287,16 @@ void RotationalOdometry::DetectNewFeatures(const cv::Mat& image, View& view) {
   }
 }
 
-void RotationalOdometry::TakeOutShutterOf(View& view,
-                                          const std::vector<const View*>& others) const {
+void RotationalOdometry::CorrectRollingShutterOf(View& view,
+                                                 const std::vector<const View*>& others) const {
   const auto time_s = [&](FrameId frame) { return timestamps_s_.at(frame); };
   const BelievedMotion believed =
       BelievedMotionAt(view.features.frame, cam_from_world_, time_s, camera_.readout_s);
   view.features.shared_error_px = believed.TypicalErrorRad() * camera_.MeanFocal();
-  TakeOutShutter(camera_, believed.motion, others, view);
+  CorrectRollingShutter(camera_, believed.motion, others, view);
 }
 
-void RotationalOdometry::TakeOutShutters(View& view, FrameEstimate& estimate) {
+void RotationalOdometry::CorrectRollingShutters(View& view, FrameEstimate& estimate) {
   const int num_recent = static_cast<int>(recent_.size());
   if (num_recent == 0) return;
   const Stopwatch stopwatch(seconds_.edges);
@@ -303,7 +304,7 @@ void RotationalOdometry::TakeOutShutters(View& view, FrameEstimate& estimate) {
   const auto at = [&](int k) { return k < 0 ? &view : recent_[k].get(); };
   std::vector<const View*> older = {at(0)};
   if (num_recent > 1) older.push_back(at(1));
-  TakeOutShutterOf(view, older);
+  CorrectRollingShutterOf(view, older);
   // The view before can now be seen from both sides, and the very first ones from further on.
   const int num_revised = num_recent < options_.view_graph.window_frames ? num_recent : 1;
   for (int k = 0; k < num_revised; ++k) {
@@ -313,12 +314,13 @@ void RotationalOdometry::TakeOutShutters(View& view, FrameEstimate& estimate) {
     } else if (k > 0) {
       others.push_back(at(k - 2));
     }
-    TakeOutShutterOf(*at(k), others);
+    CorrectRollingShutterOf(*at(k), others);
     MoveToBearings(camera_, estimate.revised_features.emplace_back(at(k)->features));
   }
   for (int k = num_revised - 1; k >= 0; --k) {
     const Features& revised = at(k)->features;
-    for (const Connection& connection : MeasureEdges(revised, PartnersInGraph(revised.frame))) {
+    for (const EdgeWithMatches& connection :
+         MeasureEdges(revised, PartnersInGraph(revised.frame))) {
       if (!IsBelieved(connection, options_.view_graph.min_inlier_ratio)) continue;
       graph_.AddEdge(connection.edge);
       estimate.revised_edges.push_back(connection.edge);
@@ -348,13 +350,13 @@ void RotationalOdometry::Connect(const View& view, FrameEstimate& estimate) {
   estimate.connections = MeasureEdges(view.features, Partners(view));
 }
 
-std::vector<Connection> RotationalOdometry::MeasureEdges(
+std::vector<EdgeWithMatches> RotationalOdometry::MeasureEdges(
     const Features& view, const std::vector<const Features*>& partners) const {
-  return ConnectView(view,
-                     partners,
-                     cam_from_world_,
-                     camera_.MeanFocal(),
-                     {options_.relative_rotation, seed_, num_threads_});
+  return EstimateEdges(view,
+                       partners,
+                       cam_from_world_,
+                       camera_.MeanFocal(),
+                       {options_.relative_rotation, seed_, num_threads_});
 }
 
 std::vector<const Features*> RotationalOdometry::Partners(const View& view) const {
@@ -375,21 +377,21 @@ std::vector<const Features*> RotationalOdometry::Partners(const View& view) cons
   return partners;
 }
 
-void RotationalOdometry::KeepGoodConnections(FrameEstimate& estimate) const {
-  std::vector<Connection>& connections = estimate.connections;
-  std::erase_if(connections, [&](const Connection& connection) {
+void RotationalOdometry::KeepGoodEdges(FrameEstimate& estimate) const {
+  std::vector<EdgeWithMatches>& connections = estimate.connections;
+  std::erase_if(connections, [&](const EdgeWithMatches& connection) {
     return !IsBelieved(connection, options_.view_graph.min_inlier_ratio);
   });
   const int min_inliers = options_.view_graph.min_edge_inliers;
-  const Connection* best = BestOf(connections);
+  const EdgeWithMatches* best = BestOf(connections);
   estimate.report.predicted_only = best == nullptr && cam_from_world_.size() > 1;
   if (best == nullptr) return;
   estimate.report.num_inliers = best->edge.num_inliers;
   estimate.report.weak = best->edge.num_inliers <= min_inliers;
   if (estimate.report.weak) {
-    connections = {Connection(*best)};
+    connections = {EdgeWithMatches(*best)};
   } else {
-    std::erase_if(connections, [&](const Connection& connection) {
+    std::erase_if(connections, [&](const EdgeWithMatches& connection) {
       return connection.edge.num_inliers <= min_inliers;
     });
   }
@@ -397,11 +399,11 @@ void RotationalOdometry::KeepGoodConnections(FrameEstimate& estimate) const {
 
 void RotationalOdometry::AverageWindow(FrameEstimate& estimate) {
   const Stopwatch stopwatch(seconds_.averaging);
-  const Connection* best = BestOf(estimate.connections);
+  const EdgeWithMatches* best = BestOf(estimate.connections);
   if (best != nullptr) {
     cam_from_world_[estimate.frame] = best->edge.j_from_i * cam_from_world_.at(best->edge.i);
   }
-  for (const Connection& connection : estimate.connections) graph_.AddEdge(connection.edge);
+  for (const EdgeWithMatches& connection : estimate.connections) graph_.AddEdge(connection.edge);
   const std::set<FrameId> free_views = ViewsToAverage(cam_from_world_, options_.averaging);
   estimate.window = AverageRotations(graph_, cam_from_world_, free_views, options_.averaging);
   estimate.window.try_emplace(estimate.frame, cam_from_world_.at(estimate.frame));
@@ -418,10 +420,10 @@ void RotationalOdometry::UpdateCovariance(FrameEstimate& estimate) {
   const bool is_tied = !estimate.connections.empty() && !(report.weak && report.searched_wide);
   if (!is_tied && cam_from_world_.size() > 1) return;
   std::set<FrameId> free_views = ViewsToAverage(cam_from_world_, options_.averaging);
-  const Connection* best = BestOf(estimate.connections);
+  const EdgeWithMatches* best = BestOf(estimate.connections);
   std::vector<SupportedEdge> edges;
   const bool is_chained = options_.averaging.mode == "off";
-  for (const Connection& connection : estimate.connections) {
+  for (const EdgeWithMatches& connection : estimate.connections) {
     if (is_chained && &connection != best) continue;
     edges.push_back({connection.edge, connection.matches.pairs});
   }
@@ -454,15 +456,15 @@ void RotationalOdometry::MeasureExposure() {
   if (!options_.tracking.match_blur || recent_.empty()) return;
   const Stopwatch stopwatch(seconds_.tracking);
   const auto time_s = [&](FrameId frame) { return timestamps_s_.at(frame); };
-  const auto turning = [&](const View& view) -> std::optional<TurningView> {
+  const auto turning = [&](const View& view) -> std::optional<RotatingView> {
     const FrameId frame = view.features.frame;
     const auto rate = RateOf(frame, cam_from_world_, time_s, kFarthestFrameForBlur_s);
     if (!rate) return std::nullopt;
-    return TurningView{{&view, cam_from_world_.at(frame)}, *rate};
+    return RotatingView{{&view, cam_from_world_.at(frame)}, *rate};
   };
   const auto newest = turning(*recent_.front());
   if (!newest) return;
-  std::optional<TurningView> most_different;
+  std::optional<RotatingView> most_different;
   double largest = 0.0;
   for (const std::shared_ptr<View>& view : recent_) {
     const auto other = turning(*view);
@@ -475,7 +477,7 @@ void RotationalOdometry::MeasureExposure() {
   if (most_different) exposure_.Add(camera_, *most_different, *newest, num_threads_);
 }
 
-void RotationalOdometry::Forget() {
+void RotationalOdometry::DropOldViews() {
   if (options_.averaging.mode == "global") return;
   // Now and then is enough: a multiple of what is needed is still bounded.
   const std::size_t needed = static_cast<std::size_t>(options_.averaging.window) + 2;
@@ -531,7 +533,7 @@ void RotationalOdometry::UpdateFlow(const TrackingResult& tracked,
   }
 }
 
-void RotationalOdometry::Remember(std::shared_ptr<View> view) {
+void RotationalOdometry::UpdateKeyframes(std::shared_ptr<View> view) {
   // A black or blurred frame is no partner for the next ones; those before it may still be.
   if (view->features.size() < options_.relative_rotation.min_inliers) return;
   const auto is_connected = [&](const View& v) {
@@ -563,7 +565,7 @@ void RotationalOdometry::Remember(std::shared_ptr<View> view) {
 void OdometryResult::Add(FrameEstimate estimate, bool keep_features) {
   for (const auto& [frame, rotation] : estimate.window) cam_from_world[frame] = rotation;
   for (const RelativeRotation& edge : estimate.revised_edges) graph.AddEdge(edge);
-  for (Connection& connection : estimate.connections) {
+  for (EdgeWithMatches& connection : estimate.connections) {
     graph.AddEdge(connection.edge);
     if (keep_features) edge_matches.push_back(std::move(connection.matches));
   }

@@ -11,11 +11,11 @@
 
 #include "rotodom/averaging/averaging.h"
 #include "rotodom/averaging/orientation_covariance.h"
-#include "rotodom/tracking/exposure.h"
+#include "rotodom/motion_blur/exposure.h"
+#include "rotodom/rolling_shutter/rolling_shutter.h"
 #include "rotodom/tracking/recovery.h"
-#include "rotodom/tracking/shutter.h"
 #include "rotodom/tracking/tracking.h"
-#include "rotodom/view_graph/connect.h"
+#include "rotodom/view_graph/estimate_edges.h"
 
 namespace rotslam {
 
@@ -73,7 +73,7 @@ struct FrameEstimate {
   // The oldest of them, and its covariance.
   FrameId settled;
   std::optional<Eigen::Matrix3d> settled_covariance;
-  std::vector<Connection> connections;  // the frame's edges, to the newest view first
+  std::vector<EdgeWithMatches> connections;  // the frame's edges, to the newest view first
   // Edges and features of the frame before, measured again now that its points are seen from both
   // sides, at the beginning also of those before; for a rolling shutter only.
   std::vector<RelativeRotation> revised_edges;
@@ -140,21 +140,21 @@ class RotationalOdometry {
   };
   Agreement AgreementOf(const TrackingResult& tracked,
                         const std::vector<OrientedView>& views) const;
-  void CarryOn(const TrackingResult& tracked,
-               const std::vector<OrientedView>& views,
-               View& view) const;
+  void AppendTracked(const TrackingResult& tracked,
+                     const std::vector<OrientedView>& views,
+                     View& view) const;
   void DetectNewFeatures(const cv::Mat& image, View& view);
   // @param others  that are taken with it, before or after it.
-  void TakeOutShutterOf(View& view, const std::vector<const View*>& others) const;
+  void CorrectRollingShutterOf(View& view, const std::vector<const View*>& others) const;
   // Of the present view, and once more of those before it, whose edges are measured again.
-  void TakeOutShutters(View& view, FrameEstimate& estimate);
+  void CorrectRollingShutters(View& view, FrameEstimate& estimate);
   // Older views that edges lead to, as far as they are remembered.
   std::vector<const Features*> PartnersInGraph(FrameId frame) const;
   void Connect(const View& view, FrameEstimate& estimate);
   std::vector<const Features*> Partners(const View& view) const;
-  std::vector<Connection> MeasureEdges(const Features& view,
-                                       const std::vector<const Features*>& partners) const;
-  void KeepGoodConnections(FrameEstimate& estimate) const;
+  std::vector<EdgeWithMatches> MeasureEdges(const Features& view,
+                                            const std::vector<const Features*>& partners) const;
+  void KeepGoodEdges(FrameEstimate& estimate) const;
   void AverageWindow(FrameEstimate& estimate);
   void UpdateCovariance(FrameEstimate& estimate);
   // None with a rolling shutter: matching blur there drifts less on renderings (RPE_n 0.44 and 0.26
@@ -163,11 +163,11 @@ class RotationalOdometry {
   // By the newest of the older views, whose rate is known from both sides, and one of those before.
   void MeasureExposure();
   // Drops what no later frame can refer to.
-  void Forget();
+  void DropOldViews();
   void UpdateFlow(const TrackingResult& tracked,
                   const std::vector<OrientedView>& views,
                   View& view) const;
-  void Remember(std::shared_ptr<View> view);
+  void UpdateKeyframes(std::shared_ptr<View> view);
   template <class Archive>
   void Transfer(Archive& archive);
 

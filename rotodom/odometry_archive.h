@@ -73,7 +73,7 @@ void TransferValue(Archive& archive, EdgeMatches& matches) {
 }
 
 template <class Archive>
-void TransferValue(Archive& archive, Connection& connection) {
+void TransferValue(Archive& archive, EdgeWithMatches& connection) {
   auto& [edge, matches, outliers_j] = connection;
   archive(edge, matches, outliers_j);
 }

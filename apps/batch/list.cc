@@ -7,7 +7,7 @@
 
 #include <yaml-cpp/yaml.h>
 
-#include "apps/config.h"
+#include "apps/cli/input/config.h"
 #include "rotodom/types/text_file.h"
 
 namespace rotslam {

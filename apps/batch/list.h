@@ -4,7 +4,7 @@
 #include <string>
 #include <vector>
 
-#include "apps/pipeline.h"
+#include "apps/cli/input/pipeline.h"
 
 namespace rotslam {
 

@@ -6,12 +6,12 @@
 
 #include <nlohmann/json.hpp>
 
-#include "apps/evaluation.h"
-#include "apps/run_summary.h"
-#include "output/atomic_file.h"
-#include "output/option_list.h"
-#include "output/summary.h"
-#include "output/trajectory.h"
+#include "apps/cli/input/evaluation.h"
+#include "apps/report/run_summary.h"
+#include "output/files/atomic_file.h"
+#include "output/files/option_list.h"
+#include "output/tables/summary.h"
+#include "output/trajectory/trajectory.h"
 #include "rotodom/sequence/layout.h"
 
 namespace rotslam {

@@ -1,4 +1,4 @@
-#include "apps/evaluation.h"
+#include "apps/cli/input/evaluation.h"
 
 #include <filesystem>
 #include <optional>
@@ -11,7 +11,7 @@
 
 #include "apps/python/arrays.h"
 #include "apps/python/module.h"
-#include "output/trajectory.h"
+#include "output/trajectory/trajectory.h"
 
 namespace py = pybind11;
 using namespace py::literals;  // NOLINT(google-build-using-namespace): "name"_a

@@ -2,7 +2,7 @@
 
 #include <opencv2/core.hpp>
 
-#include "output/summary.h"
+#include "output/tables/summary.h"
 
 PYBIND11_MODULE(rotslam, module) {
   module.doc() =

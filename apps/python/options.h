@@ -6,7 +6,7 @@
 
 #include <pybind11/pybind11.h>
 
-#include "apps/config.h"
+#include "apps/cli/input/config.h"
 
 namespace rotslam {
 

@@ -9,9 +9,9 @@
 #include <utility>
 #include <vector>
 
-#include "output/map_keypoints.h"
-#include "output/ply.h"
-#include "output/summary.h"
+#include "output/map/map_keypoints.h"
+#include "output/map/ply.h"
+#include "output/tables/summary.h"
 
 namespace rotslam {
 namespace {

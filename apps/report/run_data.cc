@@ -9,10 +9,10 @@
 #include <Eigen/Geometry>
 #include <Eigen/SVD>
 
-#include "apps/run_summary.h"
-#include "output/g2o.h"
-#include "output/trajectory.h"
-#include "output/trajectory_match.h"
+#include "apps/report/run_summary.h"
+#include "output/graph/g2o.h"
+#include "output/trajectory/trajectory.h"
+#include "output/trajectory/trajectory_match.h"
 #include "rotodom/sequence/sequence.h"
 
 namespace rotslam {

@@ -8,11 +8,11 @@
 #include <Eigen/Core>
 #include <nlohmann/json.hpp>
 
-#include "output/loops_csv.h"
-#include "output/metrics.h"
-#include "output/rotations_csv.h"
-#include "output/run_map.h"
-#include "output/segments.h"
+#include "output/map/run_map.h"
+#include "output/tables/loops_csv.h"
+#include "output/tables/rotations_csv.h"
+#include "output/tables/segments.h"
+#include "output/trajectory/metrics.h"
 #include "rotodom/types/trajectory.h"
 #include "rotodom/types/view_graph.h"
 

@@ -11,7 +11,7 @@
 #include <opencv2/imgcodecs.hpp>
 #include <opencv2/imgproc.hpp>
 
-#include "apps/run_summary.h"
+#include "apps/report/run_summary.h"
 #include "rotodom/sequence/sequence.h"
 
 namespace rotslam {

@@ -89,19 +89,19 @@ CameraPath HandheldPath(const HandheldPathOptions& options) {
 
 CameraPath GimbalPath(const GimbalPathOptions& options) {
   const int num_frames = options.num_frames;
-  const int first_turning = static_cast<int>(std::lround(0.3 * num_frames));
-  const int last_turning = num_frames - first_turning - 1;
+  const int first_rotating = static_cast<int>(std::lround(0.3 * num_frames));
+  const int last_rotating = num_frames - first_rotating - 1;
   // The stops lie half a frame outside the turning frames, so that rounding of times cannot matter.
-  const double stop_s = (first_turning - 0.5) / options.fps;
-  const double go_s = (last_turning + 0.5) / options.fps;
+  const double stop_s = (first_rotating - 0.5) / options.fps;
+  const double go_s = (last_rotating + 0.5) / options.fps;
   const double end_s = (num_frames - 1) / options.fps;
 
   CameraPath path;
   path.fps = options.fps;
   path.num_frames = num_frames;
-  path.stretches = {{0, first_turning - 1, MotionKind::kTranslating},
-                    {first_turning, last_turning, MotionKind::kRotating},
-                    {last_turning + 1, num_frames - 1, MotionKind::kTranslating}};
+  path.stretches = {{0, first_rotating - 1, MotionKind::kTranslating},
+                    {first_rotating, last_rotating, MotionKind::kRotating},
+                    {last_rotating + 1, num_frames - 1, MotionKind::kTranslating}};
   const double yaw_before = 0.12;
   const auto turn_about = [&](TurnAxis axis) {
     return options.axis == axis ? options.turn_deg * kRadFromDeg : 0.0;

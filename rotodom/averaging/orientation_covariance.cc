@@ -73,7 +73,7 @@ void OrientationCovariance::AddView(FrameId view,
     anchor_covariance_[slot * view_capacity_ + slot] =
         (num_added_ == 1 ? 0.0 : kUnknownVariance) * Eigen::Matrix3d::Identity();
   }
-  Forget();
+  DropOldViews();
   BuildSystem(cam_from_world, free_views);
 }
 
@@ -219,7 +219,7 @@ double OrientationCovariance::Share(const Edge& a, const Edge& b) {
   return share;
 }
 
-void OrientationCovariance::Forget() {
+void OrientationCovariance::DropOldViews() {
   for (int slot = 0; slot < static_cast<int>(views_.size()); ++slot) {
     View& view = views_[slot];
     if (!view.is_used || !view.is_settled || view.last_edge + options_.window >= num_added_) {

@@ -149,7 +149,7 @@ class OrientationCovariance {
   double LastingCorrelation(const Edge& a, const Edge& b);
   // Second integral of the rate's correlation at this distance.
   double LastingIntegral(int views);
-  void Forget();
+  void DropOldViews();
   void BuildSystem(const RotationMap& cam_from_world, const std::set<FrameId>& free_views);
   Eigen::Matrix3d& Gain(int view, int edge) { return gains_[edge * view_capacity_ + view]; }
   const Eigen::Matrix3d& Gain(int view, int edge) const {

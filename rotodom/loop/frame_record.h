@@ -4,7 +4,7 @@
 
 #include "rotodom/loop/loop_closure.h"
 #include "rotodom/odometry_archive.h"
-#include "rotodom/tracking/readout.h"
+#include "rotodom/rolling_shutter/readout.h"
 
 namespace rotslam {
 

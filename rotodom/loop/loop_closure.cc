@@ -7,8 +7,8 @@
 #include <stdexcept>
 #include <utility>
 
-#include "rotodom/tracking/shutter.h"
-#include "rotodom/tracking/view.h"
+#include "rotodom/features/view.h"
+#include "rotodom/rolling_shutter/rolling_shutter.h"
 #include "rotodom/types/options.h"
 #include "rotodom/types/stopwatch.h"
 
@@ -109,7 +109,7 @@ LoopReport LoopClosure::Finish(const RotationMap& cam_from_world, const Disjoint
   std::optional<Place> place = TakePending(cam_from_world);
   if (!place) return {};
   LoopReport report = VerifyBest(*place, FindCandidates(*place), cam_from_world, pieces);
-  Remember(*std::move(place), report);
+  UpdateKeyframes(*std::move(place), report);
   return report;
 }
 
@@ -120,7 +120,7 @@ void LoopClosure::Replay(const FrameEstimate& estimate,
   timestamps_s_[estimate.frame] = estimate.timestamp_s;
   if (std::optional<Place> place = TakePending(cam_from_world)) {
     FindCandidates(*place);
-    Remember(*std::move(place), report);
+    UpdateKeyframes(*std::move(place), report);
   }
   if (!corners) return;
   pending_ = {{*std::move(corners), estimate.features.tracks, {}}, estimate.features.keypoints_px};
@@ -130,7 +130,7 @@ std::optional<LoopClosure::Place> LoopClosure::TakePending(const RotationMap& ca
   if (!pending_) return std::nullopt;
   PendingPlace pending = *std::move(pending_);
   pending_.reset();
-  if (!TakeOutShutter(cam_from_world, pending.place.corners)) return std::nullopt;
+  if (!CorrectRollingShutter(cam_from_world, pending.place.corners)) return std::nullopt;
   pending.place.features = FindNearest(pending.place.corners.keypoints_px, pending.features_px);
   return std::move(pending.place);
 }
@@ -149,14 +149,14 @@ LoopReport LoopClosure::VerifyBest(const Place& place,
     LoopEvidence evidence = Verify(place, candidates[k], cam_from_world, pieces);
     if (!evidence.accepted && !evidence.connections.empty() &&
         pieces_differ(evidence.connections.front().edge)) {
-      Connection doubtful = std::move(evidence.connections.front());
+      EdgeWithMatches doubtful = std::move(evidence.connections.front());
       evidence.connections = waiting_.Confirmed(doubtful, cam_from_world, pieces);
       evidence.accepted = !evidence.connections.empty();
       if (!evidence.accepted) report.waiting.push_back(std::move(doubtful));
     }
     if (evidence.accepted) {
       report.connections = std::move(evidence.connections);
-      for (Connection& unproven : evidence.unproven) {
+      for (EdgeWithMatches& unproven : evidence.unproven) {
         report.matches.push_back(std::move(unproven.matches));
       }
     }
@@ -172,14 +172,14 @@ LoopReport LoopClosure::VerifyBest(const Place& place,
   return report;
 }
 
-void LoopClosure::Remember(Place place, const LoopReport& report) {
+void LoopClosure::UpdateKeyframes(Place place, const LoopReport& report) {
   const FrameId frame = place.corners.frame;
-  for (const Connection& connection : report.connections) {
+  for (const EdgeWithMatches& connection : report.connections) {
     finder_.Join(connection.edge.i, connection.edge.j);
   }
   for (const EdgeMatches& matches : report.matches) finder_.Join(matches.frame_i, matches.frame_j);
   waiting_.Remove(report.connections);
-  for (const Connection& connection : report.waiting) waiting_.Add(connection);
+  for (const EdgeWithMatches& connection : report.waiting) waiting_.Add(connection);
   places_.emplace(frame, std::move(place));
 }
 
@@ -213,7 +213,8 @@ LoopClosure::PendingPlace LoopClosure::Describe(const FrameEstimate& estimate,
   return pending;
 }
 
-bool LoopClosure::TakeOutShutter(const RotationMap& cam_from_world, Features& corners) const {
+bool LoopClosure::CorrectRollingShutter(const RotationMap& cam_from_world,
+                                        Features& corners) const {
   if (camera_.readout_s == 0.0) return true;
   const auto here = cam_from_world.find(corners.frame);
   if (here == cam_from_world.begin() || std::next(here) == cam_from_world.end()) return false;
@@ -259,7 +260,7 @@ LoopEvidence LoopClosure::Verify(const Place& place,
     if (static_cast<int>(old_places.size()) > options_.max_neighbours) break;
     if (neighbour != frame) old_places.push_back(&places_.at(neighbour).corners);
   }
-  TurningRates rates;
+  RotationRates rates;
   const auto time_s = [&](FrameId of) { return timestamps_s_.at(of); };
   const auto add_rate = [&](FrameId of) {
     if (const auto rate = RateOf(of, cam_from_world, time_s)) rates[of] = *rate;
@@ -276,7 +277,7 @@ LoopEvidence LoopClosure::Verify(const Place& place,
                                      options_.verification,
                                      tools_);
   for (auto* connections : {&evidence.connections, &evidence.unproven}) {
-    for (Connection& connection : *connections) {
+    for (EdgeWithMatches& connection : *connections) {
       connection.matches.pairs = MatchesOfFeatures(
           connection.matches.pairs, places_.at(connection.edge.i).features, place.features);
     }

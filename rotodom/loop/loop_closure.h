@@ -79,8 +79,8 @@ struct LoopReport {
   std::vector<LoopCheck> checks;
   // Accepted ones, the most certain one first: from older places to it, or to an older one that
   // its own confirm.
-  std::vector<Connection> connections;
-  std::vector<Connection> waiting;  // from older places to it, for others to confirm
+  std::vector<EdgeWithMatches> connections;
+  std::vector<EdgeWithMatches> waiting;  // from older places to it, for others to confirm
   // With older places that are the same, but nobody knows how they are turned.
   std::vector<EdgeMatches> matches;
 };
@@ -160,10 +160,10 @@ class LoopClosure {
                         const std::vector<LoopCandidate>& candidates,
                         const RotationMap& cam_from_world,
                         const DisjointSets& pieces);
-  void Remember(Place place, const LoopReport& report);
+  void UpdateKeyframes(Place place, const LoopReport& report);
   // Moves the corners to where a global shutter would have seen them; false when that is not known
   // well enough.
-  bool TakeOutShutter(const RotationMap& cam_from_world, Features& corners) const;
+  bool CorrectRollingShutter(const RotationMap& cam_from_world, Features& corners) const;
   std::vector<FrameId> NeighboursOf(const Place& place) const;
   // From now on it is one itself.
   std::vector<LoopCandidate> FindCandidates(const Place& place);

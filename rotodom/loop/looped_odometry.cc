@@ -15,7 +15,7 @@ void DropWhatTracksNeed(FrameRecord& record) {
   record.estimate.revised_features.clear();
   for (auto* connections :
        {&record.estimate.connections, &record.loops.connections, &record.loops.waiting}) {
-    for (Connection& connection : *connections) connection.matches.pairs.clear();
+    for (EdgeWithMatches& connection : *connections) connection.matches.pairs.clear();
   }
   for (EdgeMatches& matches : record.loops.matches) matches.pairs.clear();
 }

@@ -13,7 +13,7 @@
 #include "rotodom/loop/loop_closure.h"
 #include "rotodom/loop/looped_orientations.h"
 #include "rotodom/odometry.h"
-#include "rotodom/tracking/readout.h"
+#include "rotodom/rolling_shutter/readout.h"
 
 namespace rotslam {
 

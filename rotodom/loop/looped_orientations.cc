@@ -34,20 +34,20 @@ void LoopedOrientations::AddFrame(FrameEstimate estimate) {
     const RelativeRotation& edge = estimate.connections.front().edge;
     weak_edges_.emplace(edge.i, edge.j);
   } else {
-    for (const Connection& connection : estimate.connections) {
+    for (const EdgeWithMatches& connection : estimate.connections) {
       pieces_.Join(connection.edge.i.value, connection.edge.j.value);
     }
   }
   result_.Add(std::move(estimate), keep_features_);
 }
 
-void LoopedOrientations::AddLoop(std::vector<Connection> connections) {
+void LoopedOrientations::AddLoop(std::vector<EdgeWithMatches> connections) {
   if (connections.empty()) return;
   const RelativeRotation& best = connections.front().edge;
   AlignPieces(best);
   open_loops_.push_back(best);
   has_loops_ = true;
-  for (Connection& connection : connections) {
+  for (EdgeWithMatches& connection : connections) {
     pieces_.Join(connection.edge.i.value, connection.edge.j.value);
     result_.graph.AddEdge(connection.edge);
     if (keep_features_) result_.edge_matches.push_back(std::move(connection.matches));

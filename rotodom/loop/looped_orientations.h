@@ -34,7 +34,7 @@ class LoopedOrientations {
 
   /// Takes the edges of an accepted loop, the best one first, or none. Where no way was known
   /// between their ends, the piece of the view-graph that began later is turned at once.
-  void AddLoop(std::vector<Connection> connections);
+  void AddLoop(std::vector<EdgeWithMatches> connections);
   /// Takes matches that are known to be of the same points, and say nothing of orientations.
   void AddMatches(std::vector<EdgeMatches> matches);
 

@@ -21,13 +21,13 @@ double LargestSigmaDeg(const Eigen::Matrix3d& covariance) {
 
 // What one old place says of where the view looks.
 struct Opinion {
-  Connection connection;
+  EdgeWithMatches connection;
   Rotation old_from_world;
   Rotation view_from_world;
-  double sigma_deg = 0.0;             // of the least certain axis
-  bool is_certain = false;            // else it can but confirm others
-  std::optional<Connection> smeared;  // what it says of smeared corners
-  bool is_alike = false;              // that is certain, too, and much the same
+  double sigma_deg = 0.0;                  // of the least certain axis
+  bool is_certain = false;                 // else it can but confirm others
+  std::optional<EdgeWithMatches> blurred;  // what it says of blurred corners
+  bool is_alike = false;                   // that is certain, too, and much the same
 };
 
 // Keypoints of an old place and of the view that look alike.
@@ -36,14 +36,14 @@ using KeypointPairs = std::vector<std::array<int, 2>>;
 class Verifier {
  public:
   Verifier(const Features& view,
-           const TurningRates& rates,
+           const RotationRates& rates,
            const Camera& camera,
            const VerificationOptions& options,
            const VerificationTools& tools)
       : view_(view), rates_(rates), camera_(camera), options_(options), tools_(tools) {}
 
   // By the edge from an old place; nullopt where too few matches agree.
-  // @param asks_twice  whether it must say the same of smeared corners.
+  // @param asks_twice  whether it must say the same of blurred corners.
   std::optional<Opinion> Ask(const Features& old_place,
                              const Rotation& old_from_world,
                              const Rotation& predicted_view_from_world,
@@ -54,7 +54,7 @@ class Verifier {
     KeypointPairs keypoints;
     keypoints.reserve(matches.matches.size());
     for (const Match& match : matches.matches) keypoints.push_back({match.i.value, match.j.value});
-    std::optional<Connection> connection =
+    std::optional<EdgeWithMatches> connection =
         Connect(old_place, keypoints, predicted_view_from_old, {});
     if (!connection) return std::nullopt;
     const int inliers = connection->edge.num_inliers;
@@ -66,11 +66,11 @@ class Verifier {
     opinion.is_certain = seen_sigma_deg <= options_.max_sigma_deg;
     opinion.old_from_world = old_from_world;
     opinion.view_from_world = connection->edge.j_from_i * old_from_world;
-    opinion.smeared = asks_twice && AreSmeared(old_place)
+    opinion.blurred = asks_twice && AreBlurred(old_place)
                           ? AskedAgain(old_place, keypoints, predicted_view_from_old, *connection)
                           : connection;
-    if (opinion.smeared) {
-      RelativeRotation& edge = opinion.smeared->edge;
+    if (opinion.blurred) {
+      RelativeRotation& edge = opinion.blurred->edge;
       const Rotation between = connection->edge.j_from_i * edge.j_from_i.Inverse();
       opinion.is_alike = LargestSigmaDeg(edge.covariance) <= options_.max_sigma_deg &&
                          between.AngleDeg() <= options_.max_cycle_deg;
@@ -83,34 +83,35 @@ class Verifier {
   }
 
  private:
-  std::optional<Connection> Connect(const Features& old_place,
-                                    const KeypointPairs& keypoints,
-                                    const Rotation& predicted_view_from_old,
-                                    const std::vector<MatchNoise>& noise) const {
-    return ConnectByMatches(old_place,
-                            view_,
-                            keypoints,
-                            predicted_view_from_old,
-                            camera_.MeanFocal(),
-                            {tools_.relative_rotation, tools_.seed, tools_.num_threads},
-                            noise);
+  std::optional<EdgeWithMatches> Connect(const Features& old_place,
+                                         const KeypointPairs& keypoints,
+                                         const Rotation& predicted_view_from_old,
+                                         const std::vector<MatchNoise>& noise) const {
+    return EstimateEdge(old_place,
+                        view_,
+                        keypoints,
+                        predicted_view_from_old,
+                        camera_.MeanFocal(),
+                        {tools_.relative_rotation, tools_.seed, tools_.num_threads},
+                        noise);
   }
 
-  // The edge as smeared corners have it, if it is certain enough to confirm others.
-  std::optional<Connection> AskedAgain(const Features& old_place,
-                                       const KeypointPairs& keypoints,
-                                       const Rotation& predicted_view_from_old,
-                                       const Connection& connection) const {
+  // The edge as blurred corners have it, if it is certain enough to confirm others.
+  std::optional<EdgeWithMatches> AskedAgain(const Features& old_place,
+                                            const KeypointPairs& keypoints,
+                                            const Rotation& predicted_view_from_old,
+                                            const EdgeWithMatches& connection) const {
     const Rotation& view_from_old = connection.edge.j_from_i;
-    std::optional<Connection> smeared = Connect(old_place,
-                                                keypoints,
-                                                predicted_view_from_old,
-                                                SmearedNoise(old_place, keypoints, view_from_old));
-    if (!smeared) return std::nullopt;
-    if (LargestSigmaDeg(smeared->edge.covariance) > options_.max_witness_sigma_deg) {
+    std::optional<EdgeWithMatches> blurred =
+        Connect(old_place,
+                keypoints,
+                predicted_view_from_old,
+                BlurredNoise(old_place, keypoints, view_from_old));
+    if (!blurred) return std::nullopt;
+    if (LargestSigmaDeg(blurred->edge.covariance) > options_.max_witness_sigma_deg) {
       return std::nullopt;
     }
-    return smeared;
+    return blurred;
   }
 
   void AddShutterError(RelativeRotation& edge) const {
@@ -119,24 +120,24 @@ class Verifier {
     edge.covariance += sigma * sigma * Eigen::Matrix3d::Identity();
   }
 
-  // Whether turns smear the corners of either image so that it would matter.
-  bool AreSmeared(const Features& old_place) const {
-    constexpr double kLeastSmear = 0.3;  // an ellipse 1.04 times as long as wide
+  // Whether turns blur the corners of either image so that it would matter.
+  bool AreBlurred(const Features& old_place) const {
+    constexpr double kLeastBlur = 0.3;  // an ellipse 1.04 times as long as wide
     const auto view_rate = rates_.find(view_.frame);
     const auto old_rate = rates_.find(old_place.frame);
     if (view_rate == rates_.end() || old_rate == rates_.end()) return false;
     const double rate = std::max(view_rate->second.norm(), old_rate->second.norm());
-    return options_.smear_s_per_px * camera_.MeanFocal() * rate > kLeastSmear;
+    return options_.blur_s_per_px * camera_.MeanFocal() * rate > kLeastBlur;
   }
 
-  // Of each match, in units of an unsmeared corner's variance.
-  std::vector<MatchNoise> SmearedNoise(const Features& old_place,
+  // Of each match, in units of a sharp corner's variance.
+  std::vector<MatchNoise> BlurredNoise(const Features& old_place,
                                        const KeypointPairs& keypoints,
                                        const Rotation& view_from_old) const {
     const auto covariance_px = [&](const Features& features, int index) {
-      const Eigen::Vector2d smear = SmearOf(
-          camera_, features.bearings[index], rates_.at(features.frame), options_.smear_s_per_px);
-      return Eigen::Matrix2d(Eigen::Matrix2d::Identity() + smear * smear.transpose());
+      const Eigen::Vector2d blur = BlurVectorOf(
+          camera_, features.bearings[index], rates_.at(features.frame), options_.blur_s_per_px);
+      return Eigen::Matrix2d(Eigen::Matrix2d::Identity() + blur * blur.transpose());
     };
     const Eigen::Matrix3d R_view_old = view_from_old.Matrix();
     std::vector<MatchNoise> noise;
@@ -153,15 +154,15 @@ class Verifier {
   }
 
   const Features& view_;
-  const TurningRates& rates_;
+  const RotationRates& rates_;
   const Camera& camera_;
   const VerificationOptions& options_;
   const VerificationTools& tools_;
 };
 
-// Where the view looks, by smeared corners.
-Rotation ViewBySmeared(const Opinion& opinion) {
-  return opinion.smeared->edge.j_from_i * opinion.old_from_world;
+// Where the view looks, by blurred corners.
+Rotation ViewByBlurred(const Opinion& opinion) {
+  return opinion.blurred->edge.j_from_i * opinion.old_from_world;
 }
 
 // What may be wrong with the rotation around a short cycle: this, or so many deviations of its
@@ -205,18 +206,18 @@ std::vector<int> LargestAgreement(const std::vector<Opinion>& opinions, const Cy
   return largest;
 }
 
-// Whether an opinion's edge may go into the graph: what it says of smeared corners is what it says
-// of others, or what another one says of smeared corners.
+// Whether an opinion's edge may go into the graph: what it says of blurred corners is what it says
+// of others, or what another one says of blurred corners.
 bool IsProven(const std::vector<Opinion>& opinions,
               const std::vector<int>& agreeing,
               int index,
               double max_angle_deg) {
   const Opinion& opinion = opinions[index];
-  if (!opinion.is_certain || !opinion.smeared) return false;
+  if (!opinion.is_certain || !opinion.blurred) return false;
   if (opinion.is_alike) return true;
   return std::any_of(agreeing.begin(), agreeing.end(), [&](int other) {
-    if (other == index || !opinions[other].smeared) return false;
-    const Rotation around = ViewBySmeared(opinion) * ViewBySmeared(opinions[other]).Inverse();
+    if (other == index || !opinions[other].blurred) return false;
+    const Rotation around = ViewByBlurred(opinion) * ViewByBlurred(opinions[other]).Inverse();
     return around.AngleDeg() <= max_angle_deg;
   });
 }
@@ -232,7 +233,7 @@ std::optional<std::string> VerificationOptions::Problem() const {
   if (!(max_witness_sigma_deg >= max_sigma_deg)) {
     return OutOfRange("max_witness_sigma_deg", max_witness_sigma_deg, "at least max_sigma_deg");
   }
-  if (!(smear_s_per_px >= 0.0)) return OutOfRange("smear_s_per_px", smear_s_per_px, "zero or more");
+  if (!(blur_s_per_px >= 0.0)) return OutOfRange("blur_s_per_px", blur_s_per_px, "zero or more");
   if (!(shutter_sigma_deg >= 0.0)) {
     return OutOfRange("shutter_sigma_deg", shutter_sigma_deg, "zero or more");
   }
@@ -290,7 +291,7 @@ WayAround ScaleTurns(const RotationMap& cam_from_world,
 LoopEvidence VerifyLoop(const Features& view,
                         std::span<const Features* const> old_places,
                         const RotationMap& cam_from_world,
-                        const TurningRates& rates,
+                        const RotationRates& rates,
                         int num_consistent,
                         bool is_way_known,
                         const Camera& camera,
@@ -331,7 +332,7 @@ LoopEvidence VerifyLoop(const Features& view,
       agreeing.begin(), agreeing.end(), [&](int a, int b) { return doubt(a) < doubt(b); });
   const Opinion& best = opinions[agreeing.front()];
   const RelativeRotation& edge =
-      (is_proven[agreeing.front()] ? *best.smeared : best.connection).edge;
+      (is_proven[agreeing.front()] ? *best.blurred : best.connection).edge;
   evidence.match = edge.i;
   evidence.num_inliers = edge.num_inliers;
   const Rotation view_from_world = edge.j_from_i * cam_from_world.at(edge.i);
@@ -348,7 +349,7 @@ LoopEvidence VerifyLoop(const Features& view,
   for (const int index : agreeing) {
     if (!opinions[index].is_certain) break;
     if (is_proven[index]) {
-      evidence.connections.push_back(*std::move(opinions[index].smeared));
+      evidence.connections.push_back(*std::move(opinions[index].blurred));
     } else {
       evidence.unproven.push_back(std::move(opinions[index].connection));
     }

@@ -9,10 +9,10 @@
 #include "rotodom/camera/camera.h"
 #include "rotodom/features/features.h"
 #include "rotodom/matching/matching.h"
+#include "rotodom/motion_blur/keypoint_blur.h"
 #include "rotodom/relative_rotation/relative_rotation.h"
-#include "rotodom/tracking/smear.h"
 #include "rotodom/types/maps.h"
-#include "rotodom/view_graph/connect.h"
+#include "rotodom/view_graph/estimate_edges.h"
 
 namespace rotslam {
 
@@ -33,7 +33,7 @@ struct VerificationOptions {
   // an edge from another place does; else there is no edge, and the matches are
   // all that a loop brings. Zero asks once. TUM fr1_rpy, three seeds: 56, 45, 53 edges, 8, 5, 7 of
   // them more than 2 deg off, with zero; 21, 21, 26, the farthest 1.3, 1.6, 1.7 deg off, with 4 ms.
-  double smear_s_per_px = 0.004;
+  double blur_s_per_px = 0.004;
   // With a rolling shutter the rows of a moving camera see the scene from different places. From
   // frame to frame that is much the same; to an edge between two visits it adds this, on each axis.
   double shutter_sigma_deg = 0.3;
@@ -66,7 +66,7 @@ struct VerificationOptions {
     visit("min_inlier_ratio", min_inlier_ratio);
     visit("max_sigma_deg", max_sigma_deg);
     visit("max_witness_sigma_deg", max_witness_sigma_deg);
-    visit("smear_s_per_px", smear_s_per_px);
+    visit("blur_s_per_px", blur_s_per_px);
     visit("shutter_sigma_deg", shutter_sigma_deg);
     visit("max_cycle_deg", max_cycle_deg);
     visit("max_cycle_sigmas", max_cycle_sigmas);
@@ -105,10 +105,10 @@ struct LoopEvidence {
   bool accepted = false;
   // The certain ones of the edges that agree with each other, the most certain one first, accepted
   // or not.
-  std::vector<Connection> connections;
-  // Those that say something else of smeared corners: the same points, but how the view is turned
+  std::vector<EdgeWithMatches> connections;
+  // Those that say something else of blurred corners: the same points, but how the view is turned
   // against the old place they do not know.
-  std::vector<Connection> unproven;
+  std::vector<EdgeWithMatches> unproven;
 };
 
 struct VerificationTools {
@@ -131,7 +131,7 @@ struct VerificationTools {
 LoopEvidence VerifyLoop(const Features& view,
                         std::span<const Features* const> old_places,
                         const RotationMap& cam_from_world,
-                        const TurningRates& rates,
+                        const RotationRates& rates,
                         int num_consistent,
                         bool is_way_known,
                         const Camera& camera,

@@ -16,29 +16,30 @@ Rotation WorldFromWorld(const RelativeRotation& edge, const RotationMap& cam_fro
 
 }  // namespace
 
-void WaitingEdges::Remove(const std::vector<Connection>& connections) {
-  std::erase_if(waiting_, [&](const Connection& waiting) {
-    return std::any_of(connections.begin(), connections.end(), [&](const Connection& connection) {
-      return IsSame(waiting.edge, connection.edge);
-    });
+void WaitingEdges::Remove(const std::vector<EdgeWithMatches>& connections) {
+  std::erase_if(waiting_, [&](const EdgeWithMatches& waiting) {
+    return std::any_of(
+        connections.begin(), connections.end(), [&](const EdgeWithMatches& connection) {
+          return IsSame(waiting.edge, connection.edge);
+        });
   });
 }
 
-std::vector<Connection> WaitingEdges::Confirmed(const Connection& connection,
-                                                const RotationMap& cam_from_world,
-                                                const DisjointSets& pieces) const {
+std::vector<EdgeWithMatches> WaitingEdges::Confirmed(const EdgeWithMatches& connection,
+                                                     const RotationMap& cam_from_world,
+                                                     const DisjointSets& pieces) const {
   const RelativeRotation& edge = connection.edge;
   const Rotation turn = WorldFromWorld(edge, cam_from_world);
-  std::vector<Connection> agreeing = {connection};
-  const auto is_witness = [&](const Connection& other) {
-    return std::all_of(agreeing.begin(), agreeing.end(), [&](const Connection& known) {
+  std::vector<EdgeWithMatches> agreeing = {connection};
+  const auto is_witness = [&](const EdgeWithMatches& other) {
+    return std::all_of(agreeing.begin(), agreeing.end(), [&](const EdgeWithMatches& known) {
       const Rotation between =
           cam_from_world.at(other.edge.j) * cam_from_world.at(known.edge.j).Inverse();
       return between.AngleDeg() >= options_.min_witness_deg;
     });
   };
   int num_inliers = edge.num_inliers;
-  for (const Connection& other : waiting_) {
+  for (const EdgeWithMatches& other : waiting_) {
     const bool links_the_same = pieces.Find(other.edge.i.value) == pieces.Find(edge.i.value) &&
                                 pieces.Find(other.edge.j.value) == pieces.Find(edge.j.value);
     if (!links_the_same) continue;
@@ -52,9 +53,10 @@ std::vector<Connection> WaitingEdges::Confirmed(const Connection& connection,
       num_inliers < options_.sure_inliers) {
     return {};
   }
-  std::stable_sort(agreeing.begin(), agreeing.end(), [](const Connection& a, const Connection& b) {
-    return a.edge.covariance.trace() < b.edge.covariance.trace();
-  });
+  std::stable_sort(
+      agreeing.begin(), agreeing.end(), [](const EdgeWithMatches& a, const EdgeWithMatches& b) {
+        return a.edge.covariance.trace() < b.edge.covariance.trace();
+      });
   return agreeing;
 }
 

@@ -14,10 +14,10 @@ class WaitingEdges {
  public:
   explicit WaitingEdges(const VerificationOptions& options) : options_(options) {}
 
-  void Add(Connection connection) { waiting_.push_back(std::move(connection)); }
+  void Add(EdgeWithMatches connection) { waiting_.push_back(std::move(connection)); }
 
   /// No longer waits for these.
-  void Remove(const std::vector<Connection>& connections);
+  void Remove(const std::vector<EdgeWithMatches>& connections);
 
   /// The waiting edges that turn the two pieces against each other as `connection` does, to
   /// options.max_cycle_deg, and itself, the most certain one first: at least options.min_edges,
@@ -25,13 +25,13 @@ class WaitingEdges {
   /// else none.
   /// @param cam_from_world  present orientations of all views.
   /// @param pieces          by frame; `connection` links two of them.
-  std::vector<Connection> Confirmed(const Connection& connection,
-                                    const RotationMap& cam_from_world,
-                                    const DisjointSets& pieces) const;
+  std::vector<EdgeWithMatches> Confirmed(const EdgeWithMatches& connection,
+                                         const RotationMap& cam_from_world,
+                                         const DisjointSets& pieces) const;
 
  private:
   VerificationOptions options_;
-  std::vector<Connection> waiting_;
+  std::vector<EdgeWithMatches> waiting_;
 };
 
 }  // namespace rotslam

@@ -87,17 +87,17 @@ struct Nearest {
   }
 };
 
-// The nearest of frame j, where it is near enough and has no rival; else j = -1.
+// The nearest of frame j, where it is near enough and has no alternative; else j = -1.
 Candidate Choose(const Nearest& nearest,
                  const Features& features_j,
                  const MatchingOptions& options) {
   const auto& [first, second] = nearest;
   if (first.j < 0 || first.distance > options.max_distance) return {};
-  // The same corner found on the next level is no rival.
-  const bool rival =
+  // The same corner found on the next level is no alternative.
+  const bool alternative =
       second.j >= 0 &&
       (features_j.keypoints_px[second.j] - features_j.keypoints_px[first.j]).norm() > 4.0;
-  if (rival && first.distance > options.ratio * second.distance) return {};
+  if (alternative && first.distance > options.ratio * second.distance) return {};
   return first;
 }
 

@@ -11,7 +11,7 @@
 
 #include <Eigen/Dense>
 
-#include "rotodom/relative_rotation/plane_twin.h"
+#include "rotodom/relative_rotation/planar_ambiguity.h"
 #include "rotodom/relative_rotation/refinement.h"
 
 namespace rotslam {
@@ -158,8 +158,8 @@ class Search {
   const Consensus& best() const { return best_; }
 
   // The best of the minima that might as well be right and whose rotation is another one.
-  std::optional<Consensus> Rival() const {
-    std::optional<Consensus> rival;
+  std::optional<Consensus> Alternative() const {
+    std::optional<Consensus> alternative;
     double least = kLargestExcess;
     for (const EpipolarModel& minimum : minima_) {
       const Rotation between = minimum.j_from_i * best_.model.j_from_i.Inverse();
@@ -168,9 +168,10 @@ class Search {
       const double excess = (score.score - best_score_) / best_.num_inliers;
       if (!(excess < least)) continue;
       least = excess;
-      rival = Consensus{minimum, score.num_inliers, std::max(0.0, excess), {}, best_.num_samples};
+      alternative =
+          Consensus{minimum, score.num_inliers, std::max(0.0, excess), {}, best_.num_samples};
     }
-    return rival;
+    return alternative;
   }
 
   void DescendFrom(const Rotation& rotation) {
@@ -190,9 +191,9 @@ class Search {
     DescendFrom(rotation);
   }
 
-  void DescendFromTwin() {
+  void DescendFromAmbiguity() {
     FocusOn(best_.model.j_from_i);
-    const auto start = TwinOverPlane(thinned_, best_.model, threshold_);
+    const auto start = PlanarAmbiguity(thinned_, best_.model, threshold_);
     const auto twin = start ? Descend(*start) : std::nullopt;
     if (!twin) return;
     const HypothesisScore score = ScoreOf(*twin);
@@ -348,9 +349,9 @@ class Search {
 // longer its flow, the more such a match pretends to know. So where the wrong matches of a length
 // explain a good part of those that agree, all of that length are left out. Close points, of long
 // flow too, stay as long as they outnumber that.
-std::vector<int> WithoutChance(const PairArrays& pairs,
-                               const EpipolarModel& model,
-                               double threshold) {
+std::vector<int> RejectChanceInliers(const PairArrays& pairs,
+                                     const EpipolarModel& model,
+                                     double threshold) {
   // Lengths by powers of two in units of the threshold; shorter flows prove nothing wrong.
   constexpr int kShortest = 2;
   constexpr int kBins = 16;
@@ -391,11 +392,11 @@ std::vector<Consensus> FindConsensus(const PairArrays& pairs,
   search.DescendFrom(predicted_j_from_i);
   search.DescendFromAligned(predicted_j_from_i);
   search.Sample(seed);
-  search.DescendFromTwin();
+  search.DescendFromAmbiguity();
   std::vector<Consensus> found = {search.best()};
-  if (auto rival = search.Rival()) found.push_back(*std::move(rival));
+  if (auto alternative = search.Alternative()) found.push_back(*std::move(alternative));
   for (Consensus& consensus : found) {
-    consensus.members = WithoutChance(pairs, consensus.model, options.inlier_px / focal_px);
+    consensus.members = RejectChanceInliers(pairs, consensus.model, options.inlier_px / focal_px);
   }
   return found;
 }

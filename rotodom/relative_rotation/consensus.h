@@ -26,7 +26,7 @@ struct Consensus {
 /// With little parallax the epipolar distance has several minima, a rotation traded for a
 /// translation. So the search descends from the prediction and from the rotation that aligns the
 /// bearings best, each with every principal direction of the flow, then from small samples, and at
-/// last from the other motion that shows a plane in the same places (TwinOverPlane).
+/// last from the other motion that shows a plane in the same places (PlanarAmbiguity).
 /// Descents run on a part of the pairs, so that their cost does not depend on the number of pairs.
 /// @param predicted_j_from_i  where to start; may be far off.
 /// @param focal_px            pixels per radian, for the thresholds.

@@ -4,7 +4,7 @@
 #include <utility>
 #include <vector>
 
-#include "rotodom/tracking/patch_alignment.h"
+#include "rotodom/matching/patch_alignment.h"
 
 namespace rotslam {
 namespace {

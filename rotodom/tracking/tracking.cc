@@ -7,10 +7,10 @@
 
 #include <Eigen/Dense>
 
+#include "rotodom/matching/patch_alignment.h"
+#include "rotodom/motion_blur/blurred_patch.h"
+#include "rotodom/motion_blur/keypoint_blur.h"
 #include "rotodom/relative_rotation/normal_epipolar.h"
-#include "rotodom/tracking/blur.h"
-#include "rotodom/tracking/patch_alignment.h"
-#include "rotodom/tracking/smear.h"
 #include "rotodom/types/median.h"
 #include "rotodom/types/options.h"
 #include "rotodom/types/parallel.h"
@@ -195,28 +195,29 @@ class Search {
   }
 
   // How far a point moves in either image while that is exposed, in pixels of a level.
-  struct Streaks {
+  struct BlurVectors {
     Eigen::Vector2d in_view;
     Eigen::Vector2d in_target;
   };
 
-  // nullopt where both are smeared alike, or nobody knows.
-  std::optional<Streaks> StreaksOf(int view_index,
-                                   int index,
-                                   int level,
-                                   const Eigen::Matrix2d& target_from_view_px) const {
+  // nullopt where both are blurred alike, or nobody knows.
+  std::optional<BlurVectors> BlurVectorsOf(int view_index,
+                                           int index,
+                                           int level,
+                                           const Eigen::Matrix2d& target_from_view_px) const {
     if (!target_rate_ || !view_rates_[view_index]) return std::nullopt;
     const Eigen::Vector3d& bearing = views_[view_index].view->features.bearings[index];
-    const auto streak = [&](const Eigen::Vector3d& shown, const Eigen::Vector3d& rate) {
+    const auto blur_vector = [&](const Eigen::Vector3d& shown, const Eigen::Vector3d& rate) {
       return Eigen::Vector2d(target_.pyramid->scales[level].cwiseInverse().asDiagonal() *
-                             SmearOf(camera_, shown, rate, target_.exposure_s));
+                             BlurVectorOf(camera_, shown, rate, target_.exposure_s));
     };
-    const Streaks streaks{streak(bearing, *view_rates_[view_index]),
-                          streak(target_from_view_[view_index] * bearing, *target_rate_)};
-    if (AreSmearedAlike(target_from_view_px, streaks.in_view, streaks.in_target)) {
+    const BlurVectors blur_vectors{
+        blur_vector(bearing, *view_rates_[view_index]),
+        blur_vector(target_from_view_[view_index] * bearing, *target_rate_)};
+    if (AreBlurredAlike(target_from_view_px, blur_vectors.in_view, blur_vectors.in_target)) {
       return std::nullopt;
     }
-    return streaks;
+    return blur_vectors;
   }
 
   bool IsAlike(const std::optional<PatchAlignment>& found) const {
@@ -238,11 +239,11 @@ class Search {
         turns_patches_[view_index]
             ? PatchWarp(camera_, view.features.bearings[index], target_from_view_[view_index])
             : Eigen::Matrix2d(Eigen::Matrix2d::Identity());
-    if (const auto streaks = StreaksOf(view_index, index, level, warp)) {
-      return AlignBlurredPatch({image, center_px, warp, streaks->in_view},
+    if (const auto blur_vectors = BlurVectorsOf(view_index, index, level, warp)) {
+      return AlignBlurredPatch({image, center_px, warp, blur_vectors->in_view},
                                target,
                                start_px,
-                               streaks->in_target,
+                               blur_vectors->in_target,
                                reach_px);
     }
     const auto patch = PatchTemplate::Sample(image, center_px, warp);
@@ -335,19 +336,6 @@ std::optional<Rotation> AlignMostBearings(const std::vector<BearingPair>& pairs)
     }
   }
   return j_from_i;
-}
-
-Eigen::Matrix2d PatchWarp(const Camera& camera,
-                          const Eigen::Vector3d& bearing,
-                          const Rotation& target_from_view) {
-  Eigen::Matrix<double, 2, 3> J_view;
-  Eigen::Matrix<double, 2, 3> J_target;
-  if (!camera.Project(bearing, &J_view) || !camera.Project(target_from_view * bearing, &J_target)) {
-    return Eigen::Matrix2d::Identity();
-  }
-  const Eigen::Matrix<double, 3, 2> bearing_from_view =
-      J_view.transpose() * (J_view * J_view.transpose()).inverse();
-  return J_target * target_from_view.Matrix() * bearing_from_view;
 }
 
 TrackingResult TrackPoints(std::span<const OrientedView> views,

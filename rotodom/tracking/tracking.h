@@ -8,10 +8,10 @@
 #include <Eigen/Core>
 
 #include "rotodom/camera/camera.h"
+#include "rotodom/features/view.h"
 #include "rotodom/relative_rotation/bearing_pair.h"
+#include "rotodom/rolling_shutter/rolling_shutter.h"
 #include "rotodom/tracking/flow_field.h"
-#include "rotodom/tracking/shutter.h"
-#include "rotodom/tracking/view.h"
 
 namespace rotslam {
 
@@ -30,7 +30,7 @@ struct TrackingOptions {
   int min_points = 150;
   double min_found_ratio = 0.3;
   // Where the camera turns faster in one of two images than in the other, patches are sought with
-  // both smeared alike, by the time of exposure that the images tell; with a rolling shutter by
+  // both blurred alike, by the time of exposure that the images tell; with a rolling shutter by
   // completion alone.
   bool match_blur = true;
 
@@ -57,7 +57,7 @@ struct TrackingTarget {
   // When given, the motion beside the rotation; otherwise each point goes on with its own.
   const FlowField* flow = nullptr;
   // Of the target and the views; where they turned at different rates, that much more of the one
-  // is smeared. 0: nothing is.
+  // is blurred. 0: nothing is.
   double exposure_s = 0.0;
   // Points beyond this number that are not in the newest view are not looked for.
   int max_points = 2000;
@@ -96,13 +96,6 @@ TrackingResult TrackPoints(std::span<const OrientedView> views,
                            const Camera& camera,
                            const TrackingOptions& options,
                            int num_threads);
-
-/// The turn and stretch of a patch around `bearing` between two views that differ by a rotation.
-/// @return  2x2, maps offsets in the view to offsets in the target; the identity where one of them
-/// does not show the bearing.
-Eigen::Matrix2d PatchWarp(const Camera& camera,
-                          const Eigen::Vector3d& bearing,
-                          const Rotation& target_from_view);
 
 /// Rotation that best aligns most of the pairs' bearings, R f_i ~ f_j, whatever the others do.
 /// @return  nullopt for fewer than ten pairs.

@@ -74,7 +74,7 @@ class Sightings {
 std::set<FrameId> SelectFrom(const RotationMap& cam_from_world,
                              const std::map<FrameId, std::vector<Ray>>& rays_of,
                              std::size_t num_tracks,
-                             const std::vector<HeldStretch>& held,
+                             const std::vector<PureRotationSegment>& held,
                              const KeyframeOptions& options) {
   std::set<FrameId> keyframes;
   Sightings sightings(num_tracks);
@@ -92,7 +92,7 @@ std::set<FrameId> SelectFrom(const RotationMap& cam_from_world,
   take(keyframe);
   for (const auto& [frame, rotation] : cam_from_world) {
     const auto stretch =
-        std::find_if(held.begin(), held.end(), [&, f = frame](const HeldStretch& s) {
+        std::find_if(held.begin(), held.end(), [&, f = frame](const PureRotationSegment& s) {
           return s.first <= f && f <= s.last;
         });
     if (stretch != held.end()) {
@@ -143,7 +143,7 @@ std::optional<std::string> KeyframeOptions::Problem() const {
 
 std::set<FrameId> SelectKeyframes(const RotationMap& cam_from_world,
                                   const std::vector<Track>& tracks,
-                                  const std::vector<HeldStretch>& held,
+                                  const std::vector<PureRotationSegment>& held,
                                   const KeyframeOptions& options) {
   if (const auto problem = options.Problem())
     throw std::invalid_argument("KeyframeOptions: " + *problem);

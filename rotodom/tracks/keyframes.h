@@ -5,8 +5,8 @@
 #include <string>
 #include <vector>
 
-#include "rotodom/types/held_stretch.h"
 #include "rotodom/types/maps.h"
+#include "rotodom/types/pure_rotation_segment.h"
 #include "rotodom/types/track.h"
 
 namespace rotslam {
@@ -27,7 +27,7 @@ struct KeyframeOptions {
   // up to four times. Two keyframes give no map, three tell a lens badly.
   int min_keyframes = 5;
   // When positive, every so many frames one is a keyframe instead, whatever it shows; held
-  // stretches have theirs all the same.
+  // segments have theirs all the same.
   int every_frames = 0;
 
   std::optional<std::string> Problem() const;
@@ -43,12 +43,12 @@ struct KeyframeOptions {
 };
 
 /// Chooses the frames that carry the map. The first and the last frame of `cam_from_world` and of
-/// every held stretch are keyframes; inside a stretch there are no others.
+/// every pure-rotation segment are keyframes; inside a segment there are no others.
 /// @param tracks  over all frames, not only keyframes.
 /// Cost:    linear in the number of observations.
 std::set<FrameId> SelectKeyframes(const RotationMap& cam_from_world,
                                   const std::vector<Track>& tracks,
-                                  const std::vector<HeldStretch>& held,
+                                  const std::vector<PureRotationSegment>& held,
                                   const KeyframeOptions& options);
 
 /// The tracks with their observations in `frames` only; tracks left with fewer than `min_length`

@@ -10,8 +10,8 @@ int NumObservations(const std::vector<Track>& tracks) {
   return static_cast<int>(count);
 }
 
-Eigen::Matrix2d Unsmearing(const Eigen::Vector2f& smear) {
-  const Eigen::Vector2d s = smear.cast<double>();
+Eigen::Matrix2d Deblurring(const Eigen::Vector2f& blur) {
+  const Eigen::Vector2d s = blur.cast<double>();
   const double squared = s.squaredNorm();
   if (squared == 0.0) return Eigen::Matrix2d::Identity();
   return Eigen::Matrix2d::Identity() -

@@ -18,14 +18,14 @@ struct Observation {
   Eigen::Vector3d bearing;  // unit vector to it in the camera frame
   double sigma_px = 1.0;    // standard deviation of the keypoint, per image axis
   // Along this, in the image, the keypoint is less certain: a standard deviation of hypot(1,
-  // |smear|) times sigma_px. What moves while it is exposed is smeared.
-  Eigen::Vector2f smear = Eigen::Vector2f::Zero();
+  // |blur|) times sigma_px. What moves while it is exposed is blurred.
+  Eigen::Vector2f blur = Eigen::Vector2f::Zero();
 };
 
-/// Takes an error of a smeared keypoint, in pixels, to one that is as certain in every direction as
-/// that one is across: the inverse root of the covariance I + smear smear^T.
-/// @param smear  as of Observation.
-Eigen::Matrix2d Unsmearing(const Eigen::Vector2f& smear);
+/// Takes an error of a blurred keypoint, in pixels, to one that is as certain in every direction as
+/// that one is across: the inverse root of the covariance I + blur blur^T.
+/// @param blur  as of Observation.
+Eigen::Matrix2d Deblurring(const Eigen::Vector2f& blur);
 
 /// One scene point seen in several frames: at most one observation per frame, frames ascending.
 struct Track {

@@ -12,8 +12,8 @@
 #include <gtest/gtest.h>
 #include <nlohmann/json.hpp>
 
-#include "output/metrics.h"
-#include "output/trajectory.h"
+#include "output/trajectory/metrics.h"
+#include "output/trajectory/trajectory.h"
 #include "tests/apps/command_line.h"
 
 namespace rotslam {

@@ -12,7 +12,7 @@
 #include <opencv2/core.hpp>
 #include <opencv2/imgcodecs.hpp>
 
-#include "output/trajectory.h"
+#include "output/trajectory/trajectory.h"
 #include "tests/apps/command_line.h"
 
 namespace rotslam {

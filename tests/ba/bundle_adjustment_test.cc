@@ -183,7 +183,7 @@ TEST(RefineBundle, HoldsDriftingTracksForWhatTheyAreWhereTheOthersAreClose) {
   EXPECT_GT(num_kept, 0.98 * num_good);
 }
 
-TEST(RefineBundle, WeighsKeypointsLessAlongTheirSmear) {
+TEST(RefineBundle, WeighsKeypointsLessAlongTheirBlur) {
   // Frames turn about one axis after the other: their keypoints err by 0.2 px across and 0.6 along.
   double error = 0.0;
   double isotropic_error = 0.0;
@@ -199,31 +199,31 @@ TEST(RefineBundle, WeighsKeypointsLessAlongTheirSmear) {
         observation.keypoint_px += std::hypot(1.0, 3.0) * normal(random) * along;
         observation.keypoint_px += normal(random) * across;
         observation.bearing = *scene.camera.Unproject(observation.keypoint_px);
-        observation.smear = 3.0F * along.cast<float>();
+        observation.blur = 3.0F * along.cast<float>();
       }
     }
     BundleProblem problem = PerturbedProblem(scene, 0.1, 0.5);
     const BundleResult weighed = RefineBundle(problem, {});
-    EXPECT_TRUE(weighed.summary.has_smears);
+    EXPECT_TRUE(weighed.summary.has_motion_blur);
     error += CenterError(weighed.reconstruction, scene.truth);
     for (Track& track : problem.start.tracks) {
-      for (Observation& observation : track.observations) observation.smear.setZero();
+      for (Observation& observation : track.observations) observation.blur.setZero();
     }
     isotropic_error += CenterError(RefineBundle(problem, {}).reconstruction, scene.truth);
   }
   EXPECT_LT(error, 0.8 * isotropic_error);
 }
 
-TEST(RefineBundle, LeavesSmearsThatKeypointsDoNotShow) {
+TEST(RefineBundle, LeavesBlursThatKeypointsDoNotShow) {
   BaScene scene = MakeBaScene({.noise_px = 0.3});
   BundleProblem problem = PerturbedProblem(scene, 0.1, 0.5);
   const BundleResult plain = RefineBundle(problem, {});
   for (Track& track : problem.start.tracks) {
-    for (Observation& observation : track.observations) observation.smear = {1.2F, 0.5F};
+    for (Observation& observation : track.observations) observation.blur = {1.2F, 0.5F};
   }
-  const BundleResult smeared = RefineBundle(problem, {});
-  EXPECT_FALSE(smeared.summary.has_smears);
-  EXPECT_EQ(smeared.summary.final_cost, plain.summary.final_cost);
+  const BundleResult blurred = RefineBundle(problem, {});
+  EXPECT_FALSE(blurred.summary.has_motion_blur);
+  EXPECT_EQ(blurred.summary.final_cost, plain.summary.final_cost);
 }
 
 TEST(RefineBundle, KeepsNoResidualAboveTheFineRoundsLimit) {
@@ -290,7 +290,7 @@ TEST(RefineBundle, HoldsOnePositionThroughAPureRotation) {
 
 TEST(RefineBundle, TracksSeenFromOnePlaceHoldRotationsTogether) {
   // Frames 10..16 turn in place; tracks that cross to the moving part are cut, so only directions
-  // tie the rotations of the stretch to one another.
+  // tie the rotations of the segment to one another.
   const BaScene scene =
       MakeBaScene({.num_frames = 24, .num_points = 1200, .still_first = 10, .still_last = 16});
   BundleProblem problem = PerturbedProblem(scene, 0.1, 0.0);

@@ -81,8 +81,8 @@ const Rotation kStart = Rotation::Exp({0.3, -0.2, 0.1});
 const Eigen::Vector2d kKeypoint_px(600.0, 200.0);
 // Added to the point: nothing.
 const PointShift kShift;
-// As certain along (0.6, -1.1) as the smear there leaves it.
-const Eigen::Matrix2d kScale = Unsmearing({0.6F, -1.1F}) / 0.7;
+// As certain along (0.6, -1.1) as the blur there leaves it.
+const Eigen::Matrix2d kScale = Deblurring({0.6F, -1.1F}) / 0.7;
 
 // A reprojection cost that keeps rotation and lens as its parameters say.
 class FollowingCost final : public ceres::CostFunction {

@@ -52,7 +52,7 @@ TEST(ResectFrame, CovarianceTellsTheErrorToExpect) {
   // Mean of the squared error in its own covariance's unit, over 100 draws of noise: 6 unknowns.
   SeenPoints view = MakeView(CameraModel::kPinhole, 200, 0.0, 0.0);
   const std::vector<PointSighting> clean = view.sightings;
-  for (const double smear : {0.0, 3.0}) {
+  for (const double blur : {0.0, 3.0}) {
     std::mt19937 random(3);
     std::normal_distribution<double> normal(0.0, 0.5);
     double sum = 0.0;
@@ -61,20 +61,20 @@ TEST(ResectFrame, CovarianceTellsTheErrorToExpect) {
       for (std::size_t k = 0; k < clean.size(); ++k) {
         PointSighting& sighting = view.sightings[k];
         const double angle = 0.1 * static_cast<double>(k);
-        const Eigen::Vector2d along = smear * Eigen::Vector2d(std::cos(angle), std::sin(angle));
+        const Eigen::Vector2d along = blur * Eigen::Vector2d(std::cos(angle), std::sin(angle));
         sighting.keypoint_px += Eigen::Vector2d(normal(random), normal(random));
         sighting.keypoint_px += normal(random) * along;
         sighting.sigma_px = 0.5;
-        sighting.smear = along.cast<float>();
+        sighting.blur = along.cast<float>();
       }
       const auto pose = ResectFrame(view.camera,
                                     view.sightings,
                                     NearStart(view, 0.5, 0.2),
-                                    {.has_smears = true, .loss_scale = 20.0});
+                                    {.has_motion_blur = true, .loss_scale = 20.0});
       ASSERT_TRUE(pose);
       sum += SquaredMahalanobis(*pose, view);
     }
-    EXPECT_NEAR(sum / 100.0, 6.0, 1.2) << smear;  // standard deviation of the mean is 0.35
+    EXPECT_NEAR(sum / 100.0, 6.0, 1.2) << blur;  // standard deviation of the mean is 0.35
   }
 }
 

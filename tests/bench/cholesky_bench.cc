@@ -9,7 +9,7 @@
 #include <Eigen/SparseCholesky>
 #include <benchmark/benchmark.h>
 
-#include "output/g2o.h"
+#include "output/graph/g2o.h"
 #include "tests/scenes/wrong_edges.h"
 
 namespace rotslam {

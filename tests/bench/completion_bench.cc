@@ -7,7 +7,7 @@
 #include <benchmark/benchmark.h>
 #include <opencv2/imgproc.hpp>
 
-#include "rotodom/completion/completion.h"
+#include "rotodom/track_completion/track_completion.h"
 
 namespace rotslam {
 namespace {

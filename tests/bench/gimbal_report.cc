@@ -21,8 +21,8 @@
 #include <string>
 #include <vector>
 
-#include "output/metrics.h"
-#include "output/trajectory.h"
+#include "output/trajectory/metrics.h"
+#include "output/trajectory/trajectory.h"
 #include "tests/apps/command_line.h"
 
 namespace rotslam {
@@ -163,7 +163,7 @@ int Main(int argc, char** argv) {
   const TemporaryFolder temporary;
   const fs::path folder = argc > 1 ? fs::path(argv[1]) : temporary.path();
   fs::create_directories(folder);
-  std::ofstream(folder / "without.yaml") << "held_stretches: {enabled: false}\n";
+  std::ofstream(folder / "without.yaml") << "pure_rotation_segments: {enabled: false}\n";
   for (const bool detects : {true, false}) {
     std::printf("%s detection of pure rotation\n", detects ? "with" : "\nwithout");
     std::printf("%-16s %8s %7s %8s %8s %-10s  %s  %s %8s %8s\n",

@@ -13,7 +13,7 @@
 #include <time.h>
 #include <unistd.h>
 
-#include "krot/bisection.h"
+#include "krot/bracket/bisection.h"
 #include "tests/krot/problem_from_scene.h"
 
 namespace rotslam {

@@ -169,7 +169,7 @@ void BM_Stream(benchmark::State& state) {
       for (int view = std::max(0, k - 9); view <= k; ++view) {
         estimate.window[FrameId{view}] = scene.chained_cam_from_world.at(FrameId{view});
       }
-      std::vector<Connection> loop;
+      std::vector<EdgeWithMatches> loop;
       const int since_loop = k % kFramesPerLoop;
       if (since_loop == 0 && k > 0) {
         RelativeRotation edge;

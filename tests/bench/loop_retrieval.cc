@@ -15,7 +15,7 @@
 #include <string>
 #include <vector>
 
-#include "output/trajectory.h"
+#include "output/trajectory/trajectory.h"
 #include "rotodom/features/features.h"
 #include "rotodom/loop/default_vocabulary.h"
 #include "rotodom/loop/place_database.h"

@@ -20,7 +20,7 @@
 #include <vector>
 
 #include "apps/simulation/simulation.h"
-#include "output/trajectory.h"
+#include "output/trajectory/trajectory.h"
 #include "rotodom/camera/read_camera.h"
 #include "rotodom/odometry.h"
 #include "rotodom/sequence/sequence.h"
@@ -139,7 +139,7 @@ Accuracy Measure(const TestSequence& test,
     accuracy.online_step.Add(error(estimate.cam_from_world * online_before->Inverse(), k - 1, k),
                              Eigen::Matrix3d::Identity());
     online_before = estimate.cam_from_world;
-    for (const Connection& connection : estimate.connections) {
+    for (const EdgeWithMatches& connection : estimate.connections) {
       const RelativeRotation& edge = connection.edge;
       EdgeErrors& of_reach = accuracy.edges[{edge.rotation_only, std::min(k - edge.i.value, 5)}];
       of_reach.errors.Add(error(edge.j_from_i, edge.i.value, k), edge.covariance);

@@ -16,7 +16,7 @@
 #include <sys/resource.h>
 
 #include "apps/simulation/simulation.h"
-#include "output/trajectory.h"
+#include "output/trajectory/trajectory.h"
 #include "rotodom/camera/read_camera.h"
 #include "rotodom/odometry.h"
 #include "rotodom/sequence/sequence.h"

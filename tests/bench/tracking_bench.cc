@@ -7,8 +7,8 @@
 #include <benchmark/benchmark.h>
 #include <opencv2/imgproc.hpp>
 
-#include "rotodom/tracking/blur.h"
-#include "rotodom/tracking/patch_alignment.h"
+#include "rotodom/matching/patch_alignment.h"
+#include "rotodom/motion_blur/blurred_patch.h"
 #include "rotodom/tracking/tracking.h"
 
 namespace rotslam {
@@ -132,24 +132,24 @@ void BM_AlignPatch(benchmark::State& state) {
 }
 BENCHMARK(BM_AlignPatch)->ArgName("off")->Arg(0)->Arg(2)->Arg(8)->Arg(16);
 
-// The second image taken for one that moved by `streak` pixels while it was exposed, the first for
-// one that moved by a third of that.
+// The second image taken for one that moved by `blur vector` pixels while it was exposed, the first
+// for one that moved by a third of that.
 void BM_AlignBlurredPatch(benchmark::State& state) {
   const View view = FirstView();
-  const Eigen::Vector2d streak(static_cast<double>(state.range(0)), 0.0);
+  const Eigen::Vector2d blur_vector(static_cast<double>(state.range(0)), 0.0);
   std::size_t n = 0;
   for (auto _ : state) {
     const Eigen::Vector2d& keypoint = view.features.keypoints_px[n];
-    benchmark::DoNotOptimize(
-        AlignBlurredPatch({Scene().before, keypoint, Eigen::Matrix2d::Identity(), streak / 3.0},
-                          Scene().after,
-                          keypoint + Scene().shift_px,
-                          streak,
-                          3.0));
+    benchmark::DoNotOptimize(AlignBlurredPatch(
+        {Scene().before, keypoint, Eigen::Matrix2d::Identity(), blur_vector / 3.0},
+        Scene().after,
+        keypoint + Scene().shift_px,
+        blur_vector,
+        3.0));
     n = (n + 1) % view.features.keypoints_px.size();
   }
 }
-BENCHMARK(BM_AlignBlurredPatch)->ArgName("streak")->Arg(0)->Arg(3)->Arg(10)->Arg(20);
+BENCHMARK(BM_AlignBlurredPatch)->ArgName("blur_vector")->Arg(0)->Arg(3)->Arg(10)->Arg(20);
 
 void BM_TrackPoints(benchmark::State& state) {
   const View view = FirstView();

@@ -5,12 +5,12 @@
 
 #include "apps/batch/list.h"
 #include "apps/batch/record.h"
-#include "apps/checkpoint.h"
-#include "apps/config.h"
-#include "apps/focal_guess.h"
-#include "apps/pipeline.h"
+#include "apps/cli/input/config.h"
+#include "apps/cli/input/pipeline.h"
+#include "apps/cli/run_directory/checkpoint.h"
+#include "apps/cli/run_directory/unfinished.h"
 #include "apps/simulation/paths.h"
-#include "apps/unfinished.h"
+#include "apps/slam/focal_guess.h"
 #include "tests/fuzz/fuzz_target.h"
 
 namespace rotslam {

@@ -1,14 +1,14 @@
 // Trajectories, orientations, pose graphs and models, our own and other people's.
 
-#include "output/colmap_model.h"
-#include "output/g2o.h"
-#include "output/journal.h"
-#include "output/known_rotation_file.h"
-#include "output/metrics.h"
-#include "output/orientation_file.h"
-#include "output/rotation_list.h"
-#include "output/trajectory.h"
-#include "output/trajectory_match.h"
+#include "output/export/colmap_model.h"
+#include "output/export/known_rotation_file.h"
+#include "output/files/journal.h"
+#include "output/graph/g2o.h"
+#include "output/graph/rotation_list.h"
+#include "output/trajectory/metrics.h"
+#include "output/trajectory/orientation_file.h"
+#include "output/trajectory/trajectory.h"
+#include "output/trajectory/trajectory_match.h"
 #include "tests/fuzz/fuzz_target.h"
 
 namespace rotslam {

@@ -2,7 +2,7 @@
 
 #include <map>
 
-#include "krot/minimax_problem.h"
+#include "krot/structure/minimax_problem.h"
 #include "tests/scenes/scene.h"
 
 namespace rotslam {

@@ -2,7 +2,7 @@
 
 #include <string>
 
-#include "output/run_map.h"
+#include "output/map/run_map.h"
 #include "tests/scenes/scene.h"
 
 namespace rotslam {

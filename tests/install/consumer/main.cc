@@ -3,11 +3,11 @@
 
 #include "ba/bundle_adjustment.h"
 #include "krot/known_rotation.h"
-#include "output/ply.h"
-#include "output/trajectory.h"
+#include "output/map/ply.h"
+#include "output/trajectory/trajectory.h"
 #include "rotodom/averaging/averaging.h"
 #include "rotodom/sequence/sequence.h"
-#include "rotodom/view_graph/connect.h"
+#include "rotodom/view_graph/estimate_edges.h"
 
 // One entry of each stage, so that the linker must find all it uses.
 template <class Function>
@@ -17,7 +17,7 @@ void Need(const char* name, Function* function) {
 
 int main(int, char** argv) {
   Need("AverageRotations", &rotslam::AverageRotations);
-  Need("ConnectView", &rotslam::ConnectView);
+  Need("EstimateEdges", &rotslam::EstimateEdges);
   Need("OpenSequence", &rotslam::OpenSequence);
   Need("SolveKnownRotation", &rotslam::SolveKnownRotation);
   Need("RefineBundle", &rotslam::RefineBundle);

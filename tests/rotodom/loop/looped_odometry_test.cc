@@ -134,7 +134,7 @@ TEST(LoopedOdometry, FindsTheStartAgainAndNothingElse) {
   }
 }
 
-// No edge says quite the same of smeared corners: none is taken, but the points are the same.
+// No edge says quite the same of blurred corners: none is taken, but the points are the same.
 TEST(LoopedOdometry, JoinsTracksWhereItDoesNotKnowTheTurn) {
   LoopOptions options;
   options.verification.max_cycle_deg = 1e-9;
@@ -318,17 +318,17 @@ Value FromBytes(const std::string& bytes) {
   return value;
 }
 
-struct Remembering {
+struct UpdatesKeyframes {
   const char* name;
   double readout_s;
   bool keep_features;
   int num_threads;  // of the one that goes on
 };
-std::ostream& operator<<(std::ostream& stream, const Remembering& remembering) {
+std::ostream& operator<<(std::ostream& stream, const UpdatesKeyframes& remembering) {
   return stream << remembering.name;
 }
 
-class GoingOn : public testing::TestWithParam<Remembering> {
+class GoingOn : public testing::TestWithParam<UpdatesKeyframes> {
  protected:
   static LoopedOdometry Make(int num_threads) {
     Camera camera = SmallCamera();
@@ -342,10 +342,10 @@ class GoingOn : public testing::TestWithParam<Remembering> {
 };
 INSTANTIATE_TEST_SUITE_P(LoopedOdometry,
                          GoingOn,
-                         testing::Values(Remembering{"Tracks", 0.0, true, 1},
-                                         Remembering{"TwoThreads", 0.0, true, 2},
-                                         Remembering{"NoTracks", 0.0, false, 1},
-                                         Remembering{"RollingShutter", 0.002, true, 1}),
+                         testing::Values(UpdatesKeyframes{"Tracks", 0.0, true, 1},
+                                         UpdatesKeyframes{"TwoThreads", 0.0, true, 2},
+                                         UpdatesKeyframes{"NoTracks", 0.0, false, 1},
+                                         UpdatesKeyframes{"RollingShutter", 0.002, true, 1}),
                          testing::PrintToStringParamName());
 
 TEST_P(GoingOn, IsTheSameToTheLastBit) {

@@ -90,7 +90,7 @@ class Odometry {
   RotationMap cam_from_world_;
 };
 
-std::vector<Connection> LoopEdges(const Loop& loop, double variance) {
+std::vector<EdgeWithMatches> LoopEdges(const Loop& loop, double variance) {
   RelativeRotation edge;
   edge.i = FrameId{loop.i};
   edge.j = FrameId{loop.j};
@@ -98,7 +98,7 @@ std::vector<Connection> LoopEdges(const Loop& loop, double variance) {
   edge.j_from_i = truth.at(edge.j) * truth.at(edge.i).Inverse();
   edge.covariance = variance * Eigen::Matrix3d::Identity();
   edge.num_inliers = 500;
-  return {Connection{edge, {}, {}}};
+  return {EdgeWithMatches{edge, {}, {}}};
 }
 
 struct Course {

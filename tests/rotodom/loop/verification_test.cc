@@ -85,7 +85,7 @@ struct Case {
   Features view;
   std::vector<Features> old_places;  // the candidate is place 1
   RotationMap cam_from_world;
-  TurningRates rates;
+  RotationRates rates;
   int num_consistent = 1;
   bool is_way_known = true;
   VerificationOptions options;
@@ -132,7 +132,7 @@ Case TruePlace(double outlier_ratio = 0.0) {
 std::vector<int> ConnectedFrames(const LoopEvidence& evidence) {
   std::vector<int> frames;
   frames.reserve(evidence.connections.size());
-  for (const Connection& connection : evidence.connections) {
+  for (const EdgeWithMatches& connection : evidence.connections) {
     frames.push_back(connection.edge.i.value);
   }
   return frames;
@@ -157,7 +157,7 @@ TEST(VerifyLoop, AcceptsATruePlace) {
     EXPECT_THAT(ConnectedFrames(evidence), testing::UnorderedElementsAre(0, 1, 2));
     EXPECT_EQ(evidence.match, evidence.connections.front().edge.i);
     EXPECT_EQ(evidence.num_inliers, evidence.connections.front().edge.num_inliers);
-    for (const Connection& connection : evidence.connections) {
+    for (const EdgeWithMatches& connection : evidence.connections) {
       EXPECT_EQ(connection.edge.j, FrameId{kPresent});
       EXPECT_LT(ErrorDeg(c.scene, connection.edge), 0.2) << outlier_ratio;
     }
@@ -168,7 +168,7 @@ TEST(VerifyLoop, GivesTheMatchesThatAgree) {
   Case c = TruePlace(0.2);
   const LoopEvidence evidence = c.Verify();
   ASSERT_TRUE(evidence.accepted);
-  for (const Connection& connection : evidence.connections) {
+  for (const EdgeWithMatches& connection : evidence.connections) {
     const Features& place = c.Place(connection.edge.i.value);
     EXPECT_EQ(connection.matches.frame_i, place.frame);
     EXPECT_EQ(connection.matches.frame_j, c.view.frame);
@@ -421,48 +421,48 @@ TEST(VerifyLoop, ARollingShutterMakesEdgesLessCertain) {
   }
 }
 
-// A place whose cameras rolled while they were exposed: `sigma` times as far as corners are smeared
+// A place whose cameras rolled while they were exposed: `sigma` times as far as corners are blurred
 // they err along it.
-Case SmearedPlace(double sigma, std::uint64_t seed) {
+Case BlurredPlace(double sigma, std::uint64_t seed) {
   Case c = TruePlace();
   const Camera& camera = c.scene.camera;
   const Eigen::Vector3d rate(0.0, 0.0, 3.0);
   SceneRandom random(seed);
-  const auto smear = [&](Features& features) {
+  const auto blur = [&](Features& features) {
     for (int n = 0; n < features.size(); ++n) {
       const Eigen::Vector2d whole_px =
-          SmearOf(camera, features.bearings[n], rate, c.options.smear_s_per_px);
+          BlurVectorOf(camera, features.bearings[n], rate, c.options.blur_s_per_px);
       features.keypoints_px[n] += random.Normal(sigma) * whole_px;
       features.bearings[n] = *camera.Unproject(features.keypoints_px[n]);
     }
     c.rates[features.frame] = rate;
   };
-  smear(c.view);
-  for (Features& place : c.old_places) smear(place);
+  blur(c.view);
+  for (Features& place : c.old_places) blur(place);
   return c;
 }
 
-TEST(VerifyLoop, WeighsCornersByTheirSmears) {
-  const auto mean_error_deg = [](double smear_s_per_px) {
+TEST(VerifyLoop, WeighsCornersByTheirBlur) {
+  const auto mean_error_deg = [](double blur_s_per_px) {
     double sum = 0.0;
     int count = 0;
     for (std::uint64_t seed = 1; seed <= 10; ++seed) {
-      Case c = SmearedPlace(0.3, seed);
-      c.options.smear_s_per_px = smear_s_per_px;
-      for (const Connection& connection : c.Verify().connections) {
+      Case c = BlurredPlace(0.3, seed);
+      c.options.blur_s_per_px = blur_s_per_px;
+      for (const EdgeWithMatches& connection : c.Verify().connections) {
         sum += ErrorDeg(c.scene, connection.edge);
         ++count;
       }
     }
-    EXPECT_GE(count, 25) << smear_s_per_px;
+    EXPECT_GE(count, 25) << blur_s_per_px;
     return sum / count;
   };
-  EXPECT_LT(mean_error_deg(VerificationOptions{}.smear_s_per_px), 0.85 * mean_error_deg(0.0));
+  EXPECT_LT(mean_error_deg(VerificationOptions{}.blur_s_per_px), 0.85 * mean_error_deg(0.0));
 }
 
 // The places are the same, but not how they are turned against each other.
-TEST(VerifyLoop, EdgesMustSayTheSameOfSmearedCorners) {
-  Case c = SmearedPlace(0.5, 1);
+TEST(VerifyLoop, EdgesMustSayTheSameOfBluredCorners) {
+  Case c = BlurredPlace(0.5, 1);
   ASSERT_EQ(c.Verify().connections.size(), 3U);
   // Nothing says quite the same; among each other they may differ by their deviations.
   c.options.max_cycle_deg = 1e-9;
@@ -531,7 +531,7 @@ TEST(VerificationOptions, NamesTheFirstFieldOutOfRange) {
       problem([](Options o) { o.min_inlier_ratio = 1.0; }).starts_with("min_inlier_ratio is 1"));
   EXPECT_TRUE(problem([](Options o) { o.max_sigma_deg = 0.0; }).starts_with("max_sigma_deg is 0"));
   EXPECT_TRUE(
-      problem([](Options o) { o.smear_s_per_px = -1.0; }).starts_with("smear_s_per_px is -1"));
+      problem([](Options o) { o.blur_s_per_px = -1.0; }).starts_with("blur_s_per_px is -1"));
   EXPECT_TRUE(
       problem([](Options o) { o.max_cycle_deg = -1.0; }).starts_with("max_cycle_deg is -1"));
   EXPECT_TRUE(problem([](Options o) {

@@ -25,8 +25,8 @@ struct TwoPieces {
     }
   }
 
-  Connection Edge(int i, int j, double error_deg = 0.0, int num_inliers = 150) const {
-    Connection connection;
+  EdgeWithMatches Edge(int i, int j, double error_deg = 0.0, int num_inliers = 150) const {
+    EdgeWithMatches connection;
     connection.edge.i = FrameId{i};
     connection.edge.j = FrameId{j};
     connection.edge.j_from_i =
@@ -36,12 +36,12 @@ struct TwoPieces {
     return connection;
   }
 
-  int NumConfirmed(const WaitingEdges& waiting, const Connection& connection) const {
+  int NumConfirmed(const WaitingEdges& waiting, const EdgeWithMatches& connection) const {
     return static_cast<int>(waiting.Confirmed(connection, cam_from_world, pieces).size());
   }
 };
 
-WaitingEdges WaitingFor(const Connection& connection, VerificationOptions options = {}) {
+WaitingEdges WaitingFor(const EdgeWithMatches& connection, VerificationOptions options = {}) {
   WaitingEdges waiting(options);
   waiting.Add(connection);
   return waiting;

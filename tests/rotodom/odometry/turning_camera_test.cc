@@ -88,9 +88,10 @@ double RelativeErrorDeg(const RotationMap& estimate, const Motion& cam_from_worl
 }
 
 bool HasEdge(const FrameEstimate& estimate, int i) {
-  return std::any_of(estimate.connections.begin(),
-                     estimate.connections.end(),
-                     [&](const Connection& connection) { return connection.edge.i == FrameId{i}; });
+  return std::any_of(
+      estimate.connections.begin(),
+      estimate.connections.end(),
+      [&](const EdgeWithMatches& connection) { return connection.edge.i == FrameId{i}; });
 }
 
 // A camera that looks around without ever leaving its first view.
@@ -102,7 +103,7 @@ Rotation LookAround(double time_s) {
 // 50 deg from left to right, at 75 deg/s; the image is 65 deg wide.
 Rotation PanAcross(double time_s) { return TurnDeg(0.0, -25.0 + 75.0 * time_s, 0.0); }
 
-TEST(TurningCamera, KeyframeEdgesLastAsLongAsTheOverlap) {
+TEST(RotatingCamera, KeyframeEdgesLastAsLongAsTheOverlap) {
   const int window = ViewGraphOptions{}.window_frames;
   const std::vector<FrameEstimate> staying = Follow(Film(LookAround, 20));
   for (int k = window + 1; k < 20; ++k) {
@@ -116,7 +117,7 @@ TEST(TurningCamera, KeyframeEdgesLastAsLongAsTheOverlap) {
   int last_with_old = 0;
   for (int k = 0; k < 20; ++k) {
     if (HasEdge(leaving[k], 0)) last_with_first = k;
-    for (const Connection& connection : leaving[k].connections) {
+    for (const EdgeWithMatches& connection : leaving[k].connections) {
       if (connection.edge.i.value < k - window) last_with_old = k;
       EXPECT_GT(connection.edge.num_inliers, ViewGraphOptions{}.min_edge_inliers);
     }
@@ -127,7 +128,7 @@ TEST(TurningCamera, KeyframeEdgesLastAsLongAsTheOverlap) {
   EXPECT_EQ(last_with_old, 19);    // newer keyframes have taken its place
 }
 
-TEST(TurningCamera, DriftsLittleWhileItStays) {
+TEST(RotatingCamera, DriftsLittleWhileItStays) {
   constexpr double kNoise = 6.0;  // grey levels
   std::vector<cv::Mat> images = Film(LookAround, 40);
   cv::RNG random(1);
@@ -153,7 +154,7 @@ TEST(TurningCamera, DriftsLittleWhileItStays) {
   EXPECT_LT(with_deg, 1.1 * without_deg);
 }
 
-TEST(TurningCamera, TheWindowStaysAsLargeAsItIs) {
+TEST(RotatingCamera, TheWindowStaysAsLargeAsItIs) {
   const std::vector<FrameEstimate> estimates = Follow(Film(LookAround, 24));
   const int room = AveragingOptions{}.window;
   for (int k = room; k < 24; ++k) {
@@ -163,7 +164,7 @@ TEST(TurningCamera, TheWindowStaysAsLargeAsItIs) {
   }
 }
 
-TEST(TurningCamera, AJumpIsFoundByDescriptors) {
+TEST(RotatingCamera, AJumpIsFoundByDescriptors) {
   constexpr int kJump = 6;
   // 22 deg to the right and a roll of 10 deg between two frames, after standing nearly still.
   const Motion motion = [](double time_s) {
@@ -277,9 +278,9 @@ TEST(RollingShutter, RevisesTheEdgesOfTheFrameBefore) {
 // What the shutter bends must not pass for a baseline.
 TEST(RollingShutter, LeavesATurnInPlaceOne) {
   const OdometryResult shaken = Collect(Follow(Film(Shake, 30, 0.025), 0.025));
-  int num_turning = 0;
-  for (const RelativeRotation& edge : shaken.graph.edges()) num_turning += edge.rotation_only;
-  const double share = num_turning / static_cast<double>(shaken.graph.edges().size());
+  int num_rotating = 0;
+  for (const RelativeRotation& edge : shaken.graph.edges()) num_rotating += edge.rotation_only;
+  const double share = num_rotating / static_cast<double>(shaken.graph.edges().size());
   RecordProperty("share", std::to_string(share));
   EXPECT_GT(share, 0.9);
 }
@@ -325,19 +326,19 @@ double TurnedShare(const OdometryResult& result) {
   return static_cast<double>(turned) / static_cast<double>(edges.size());
 }
 
-TEST(Blur, IsNoMovementWhereBothImagesAreSmearedAlike) {
+TEST(Blur, IsNoMovementWhereBothImagesAreBlurredAlike) {
   OdometryOptions as_they_are = FewFeatures();
   as_they_are.tracking.match_blur = false;
-  const OdometryResult smeared = Collect(Follow(BlurredFilm(), 0.0, as_they_are));
+  const OdometryResult blurred = Collect(Follow(BlurredFilm(), 0.0, as_they_are));
   const OdometryResult alike = Collect(Follow(BlurredFilm()));
-  const double smeared_deg = RelativeErrorDeg(smeared.cam_from_world, LookAside, 1);
+  const double blurred_deg = RelativeErrorDeg(blurred.cam_from_world, LookAside, 1);
   const double alike_deg = RelativeErrorDeg(alike.cam_from_world, LookAside, 1);
-  RecordProperty("deg", std::to_string(smeared_deg) + " -> " + std::to_string(alike_deg));
+  RecordProperty("deg", std::to_string(blurred_deg) + " -> " + std::to_string(alike_deg));
   RecordProperty(
-      "turned", std::to_string(TurnedShare(smeared)) + " -> " + std::to_string(TurnedShare(alike)));
-  EXPECT_LT(TurnedShare(smeared), 0.7);
+      "turned", std::to_string(TurnedShare(blurred)) + " -> " + std::to_string(TurnedShare(alike)));
+  EXPECT_LT(TurnedShare(blurred), 0.7);
   EXPECT_GT(TurnedShare(alike), 0.95);
-  EXPECT_LT(alike_deg, 0.5 * smeared_deg);
+  EXPECT_LT(alike_deg, 0.5 * blurred_deg);
 }
 
 TEST(Blur, TellsTheTimeOfExposure) {

@@ -7,7 +7,7 @@
 #include <random>
 #include <vector>
 
-#include "rotodom/tracking/readout.h"
+#include "rotodom/rolling_shutter/readout.h"
 #include "rotodom/types/rotation.h"
 
 namespace rotslam {

@@ -419,13 +419,13 @@ TEST(TrackPoints, SeeksPointsOfASharpViewInABlurredOne) {
     return ErrorsPx(
         TrackPoints(views, target, SmallCamera(), {}, 1), views, film.cam_from_world[5]);
   };
-  const std::vector<double> smeared = errors_px(0.0);
+  const std::vector<double> blurred = errors_px(0.0);
   const std::vector<double> alike = errors_px(kExposureS);
-  Record("median_px", Quantile(smeared, 0.5));
+  Record("median_px", Quantile(blurred, 0.5));
   Record("median_alike_px", Quantile(alike, 0.5));
-  EXPECT_GT(static_cast<double>(alike.size()), 0.98 * static_cast<double>(smeared.size()));
-  EXPECT_LT(Quantile(alike, 0.5), 0.5 * Quantile(smeared, 0.5));
-  EXPECT_LT(Quantile(alike, 0.9), 0.5 * Quantile(smeared, 0.9));
+  EXPECT_GT(static_cast<double>(alike.size()), 0.98 * static_cast<double>(blurred.size()));
+  EXPECT_LT(Quantile(alike, 0.5), 0.5 * Quantile(blurred, 0.5));
+  EXPECT_LT(Quantile(alike, 0.9), 0.5 * Quantile(blurred, 0.9));
 }
 
 }  // namespace

@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <vector>
 
-#include "rotodom/tracking/view.h"
+#include "rotodom/features/view.h"
 #include "tests/rotodom/features/textured_world.h"
 
 namespace rotslam {

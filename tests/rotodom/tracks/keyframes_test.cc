@@ -43,7 +43,7 @@ std::vector<int> Values(const std::set<FrameId>& frames) {
 }
 
 std::vector<int> Select(const Walk& walk,
-                        const std::vector<HeldStretch>& held = {},
+                        const std::vector<PureRotationSegment>& held = {},
                         const KeyframeOptions& options = {
                             .min_parallax_deg = 1.0, .min_shared_ratio = 0.6, .min_keyframes = 0}) {
   return Values(SelectKeyframes(walk.cam_from_world, walk.tracks, held, options));
@@ -132,7 +132,7 @@ TEST(SelectKeyframes, PointsOfKnownDepthReachFromOneKeyframeToTheNext) {
   options.min_parallax_deg = 1.0;
   options.min_shared_ratio = 0.1;
   options.min_keyframes = 0;
-  std::vector<HeldStretch> held(1);
+  std::vector<PureRotationSegment> held(1);
   held[0].first = held[0].last = FrameId{3};
   options.min_linked_ratio = 0.0;
   EXPECT_EQ(Select(walk, held, options), (List{0, 3, 6}));
@@ -140,7 +140,7 @@ TEST(SelectKeyframes, PointsOfKnownDepthReachFromOneKeyframeToTheNext) {
   EXPECT_EQ(Select(walk, held, options), (List{0, 3, 4, 6}));
 }
 
-TEST(SelectKeyframes, HeldStretchesKeepTheirEndsAlone) {
+TEST(SelectKeyframes, PureRotationSegmentsKeepTheirEndsAlone) {
   Walk walk = MakeWalk(20, 0.3, {6, 7, 8, 9, 10, 11, 12, 13, 14});
   // The stretch begins at frame 5: the first step without motion leads to frame 6.
   EXPECT_EQ(Select(walk, {{FrameId{5}, FrameId{14}}}), (List{0, 4, 5, 14, 18, 19}));

@@ -1,0 +1,122 @@
+#include "apps/cli/input/input.h"
+
+#include <filesystem>
+#include <stdexcept>
+
+#include "apps/cli/input/input_lines.h"
+#include "apps/slam/focal_guess.h"
+#include "rotodom/camera/camera_form.h"
+#include "rotodom/camera/read_camera.h"
+#include "rotodom/loop/vocabulary_file.h"
+#include "rotodom/sequence/sequence_form.h"
+
+namespace rotslam {
+
+void InputFlags::Override(SequenceOptions& options) const {
+  if (first) options.first = *first;
+  if (last) options.last = *last;
+  if (stride) options.stride = *stride;
+  if (fps) options.fps = *fps;
+}
+
+void InputFlags::Override(LoopOptions& options) const {
+  if (loops) options.use_loops = *loops;
+}
+
+void AddInputFlags(CLI::App& command, InputFlags& flags) {
+  command
+      .add_option("sequence",
+                  flags.sequence,
+                  "Folder of images, video or recording; known are " + SequenceFormNames())
+      ->required();
+  command.add_option("--camera",
+                     flags.camera,
+                     "Calibration, of several cameras FILE:NAME: " + CameraFormNames() +
+                         "; not needed where it lies with the images");
+  command
+      .add_flag("--focal-guess",
+                flags.focal_guess,
+                "Do without a calibration: focal length from EXIF data or 1.2 x the longer side, "
+                "refined in a first pass over the beginning; less accurate")
+      ->excludes("--camera");
+  command.add_option("--out", flags.out, "Folder for the results, made if it is not there")
+      ->required();
+  command.add_option("--first", flags.first, "First input frame to use");
+  command.add_option("--last", flags.last, "Last input frame to use; -1: to the end");
+  command.add_option("--stride", flags.stride, "Use every n-th frame");
+  command.add_flag_function(
+      "--loops,!--no-loops",
+      [&flags](std::int64_t given) { flags.loops = given > 0; },
+      "Look for places seen before and spread the drift (the default)");
+  command.add_option("--vocabulary",
+                     flags.vocabulary,
+                     "Visual words for that: our own file or ORB-SLAM's ORBvoc.txt; not needed");
+  command.add_option("--fps", flags.fps, "Frames per second where the input has no timestamps");
+}
+
+std::shared_ptr<const Vocabulary> OpenVocabulary(const InputFlags& flags) {
+  if (flags.vocabulary.empty()) return nullptr;
+  return std::make_shared<const Vocabulary>(ReadVocabulary(flags.vocabulary));
+}
+
+void ReadCalibration(const InputFlags& flags, Input& input) {
+  const Sequence& sequence = *input.sequence;
+  const cv::Size size = sequence.image_size();
+  Camera camera;
+  if (!flags.camera.empty() || sequence.camera_reference()) {
+    const CameraReference reference =
+        flags.camera.empty() ? *sequence.camera_reference() : ParseCameraReference(flags.camera);
+    const CameraFile file = ReadCameraFile(reference.file);
+    const NamedCamera chosen = ChooseCamera(file, reference, sequence.image_folder());
+    camera = AtSize(chosen, size.width, size.height);
+    input.camera_file = reference.file.string();
+    input.camera_source =
+        input.camera_file + (chosen.name.empty() ? "" : ":" + chosen.name) + ", " + file.form;
+    input.camera_notes = file.notes;
+  } else if (const auto& own_camera = sequence.own_camera()) {
+    input.camera_file = sequence.form();
+    input.camera_source = "as " + sequence.form() + " says";
+    camera = *own_camera;
+  } else {
+    throw std::runtime_error(
+        flags.sequence +
+        ": no calibration lies with the images; give one with --camera FILE (film a printed "
+        "checkerboard and let `rotslam calibrate` make it), or have one guessed with "
+        "--focal-guess");
+  }
+  try {
+    input.camera = MatchToImages(camera, size);
+  } catch (const std::runtime_error& error) {
+    throw std::runtime_error(input.camera_file + ": " + error.what());
+  }
+}
+
+Input OpenInput(const InputFlags& flags,
+                const SequenceOptions& options,
+                const std::function<void(const std::string&)>& tell) {
+  Input input;
+  input.path = std::filesystem::absolute(flags.sequence).lexically_normal().string();
+  input.sequence = OpenSequence(flags.sequence, options);
+  for (const std::string& line : DescribeSequence(*input.sequence)) tell(line);
+  if (flags.focal_guess) {
+    const cv::Size size = input.sequence->image_size();
+    input.guess = GuessFocal(flags.sequence, options, size);
+    input.camera = CameraOf(*input.guess, size);
+  } else {
+    ReadCalibration(flags, input);
+  }
+  if (!flags.rotations.empty()) {
+    OrientationFile file = ReadOrientationFile(flags.rotations);
+    for (const std::string& note : file.notes) tell("note:   " + flags.rotations + ": " + note);
+    input.given_rotations = std::move(file.orientations);
+    input.rotations_file = flags.rotations;
+  }
+  for (const std::string& line : DescribeCamera(input)) tell(line);
+  if (input.sequence->NumFrames() >= 0 && input.sequence->NumFrames() < 3) {
+    throw std::runtime_error(flags.sequence + ": " + std::to_string(input.sequence->NumFrames()) +
+                             " frames after --first, --last and --stride; at least 3 are needed");
+  }
+  return input;
+}
+
+}  // namespace rotslam

@@ -1,0 +1,75 @@
+#pragma once
+
+#include <memory>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "apps/cli/command.h"
+#include "output/trajectory/orientation_file.h"
+#include "rotodom/camera/camera.h"
+#include "rotodom/loop/loop_closure.h"
+#include "rotodom/rolling_shutter/readout.h"
+#include "rotodom/sequence/sequence.h"
+
+namespace rotslam {
+
+/// What `run` and `rotations` take.
+struct InputFlags {
+  std::string sequence;
+  std::string camera;
+  bool focal_guess = false;  // do without a calibration
+  std::string out;
+  // Set: override the configuration.
+  std::optional<int> first;
+  std::optional<int> last;
+  std::optional<int> stride;
+  std::optional<double> fps;
+  std::optional<bool> loops;
+  std::string rotations;   // orientations from elsewhere; empty: from the images
+  std::string vocabulary;  // empty: the one that comes with the program
+
+  void Override(SequenceOptions& options) const;
+  void Override(LoopOptions& options) const;
+};
+
+void AddInputFlags(CLI::App& command, InputFlags& flags);
+
+/// A focal length that no calibration gives.
+struct FocalGuess {
+  std::string source;     // "focal_guess_exif" or "focal_guess_width"
+  double guess_px = 0.0;  // at first
+  double focal_px = 0.0;  // what is worked with
+};
+
+struct Input {
+  std::string path;  // of the sequence, absolute
+  std::unique_ptr<Sequence> sequence;
+  Camera camera;  // with the size of the images
+  std::string camera_file;
+  std::string camera_source;              // for people: the file, the camera in it, its form
+  std::vector<std::string> camera_notes;  // what its reader ignored or assumed
+  std::optional<FocalGuess> guess;        // set: there is no camera_file
+  // How its sensor is read out, where the images tell it instead of the calibration.
+  std::optional<ReadoutEstimate> readout;
+  // Orientations from elsewhere, and their file.
+  std::optional<std::vector<StampedRotation>> given_rotations;
+  std::string rotations_file;
+};
+
+/// The vocabulary that --vocabulary names; null when it names none. Throws std::runtime_error with
+/// one clear line.
+std::shared_ptr<const Vocabulary> OpenVocabulary(const InputFlags& flags);
+
+/// Reads the camera of `input`'s sequence: from --camera, else from what lies with the images, else
+/// as the form of the input says. Throws std::runtime_error with one clear line.
+void ReadCalibration(const InputFlags& flags, Input& input);
+
+/// Opens the sequence, reads its camera (`flags.camera`, else what lies with the images; or guesses
+/// it where `flags.focal_guess`) and says what was understood through `tell`; reads
+/// `flags.rotations`, too. Throws std::runtime_error with one clear line.
+Input OpenInput(const InputFlags& flags,
+                const SequenceOptions& options,
+                const std::function<void(const std::string&)>& tell);
+
+}  // namespace rotslam

@@ -1,0 +1,24 @@
+#pragma once
+
+#include <filesystem>
+
+#include "apps/cli/command.h"
+#include "apps/cli/terminal/progress.h"
+
+namespace rotslam {
+
+struct TruthSource;
+
+/// Writes report.html into the folder of a run that has just ended. A report that fails is a
+/// warning: the run's results are there.
+void WriteReportOfRun(const std::filesystem::path& directory,
+                      const CommonFlags& flags,
+                      Progress& progress);
+
+/// What `report` and `plot` compare a run with.
+void AddTruthFlags(CLI::App& command, TruthSource& truth);
+
+/// `run` and `rotations` write one; `--no-report` leaves it out.
+void AddReportFlag(CLI::App& command, bool& use_report);
+
+}  // namespace rotslam

@@ -1,0 +1,78 @@
+#pragma once
+
+#include <chrono>
+#include <condition_variable>
+#include <memory>
+#include <mutex>
+#include <string>
+#include <thread>
+#include <vector>
+
+#include "apps/cli/command.h"
+
+namespace spdlog {
+class logger;
+}  // namespace spdlog
+
+namespace rotslam {
+
+/// Tells a person how a run is getting on: one line that renews itself on a terminal, a plain line
+/// now and then elsewhere. Writes to standard error; warnings are shown even when quiet. The log
+/// file gets every line, details included, with its time. May be used from several threads.
+class Progress {
+ public:
+  /// Throws std::runtime_error when the log file cannot be written.
+  explicit Progress(const CommonFlags& flags);
+  /// Takes the renewed line away, so that an error's own line stands alone.
+  ~Progress();
+  Progress(const Progress&) = delete;
+  Progress& operator=(const Progress&) = delete;
+
+  /// A line that stays; control characters, which names of files may hold, are shown as '?'.
+  void Say(const std::string& line);
+  void Warn(const std::string& line);
+  /// A line that only --verbose shows.
+  void Detail(const std::string& line);
+
+  /// Begins a stage of `total` steps (negative: not known).
+  void StartStage(const std::string& name, int total);
+  /// Step `done` of the stage is finished. The counters are shown behind the figures, as many as
+  /// there is room for.
+  void Step(int done, const std::vector<std::string>& counters = {});
+  /// Ends the stage with one line that stays.
+  void EndStage(const std::string& note = {});
+
+ private:
+  using Clock = std::chrono::steady_clock;
+
+  std::vector<std::string> Figures() const;
+  void Renew();
+  void Print(const std::string& line);
+  void ClearLine();
+  // Shows the seconds of a stage that makes no steps.
+  void Tick();
+
+  bool quiet_;
+  bool verbose_;
+  bool terminal_;
+  bool colour_;
+  std::shared_ptr<spdlog::logger> log_;  // null: none
+
+  std::mutex mutex_;  // of all below
+  std::string stage_;
+  int total_ = -1;
+  int done_ = 0;
+  std::vector<std::string> counters_;
+  Clock::time_point started_;
+  Clock::time_point shown_;
+  bool stage_open_ = false;
+  bool line_open_ = false;
+  bool ending_ = false;
+  std::condition_variable wake_;
+  std::thread ticker_;  // on a terminal only
+};
+
+/// "rotslam: <message>" on standard error as one such line, and in the log file if there is one.
+void PrintError(std::string message);
+
+}  // namespace rotslam

@@ -1,0 +1,121 @@
+#include "apps/slam/map_views.h"
+
+#include <array>
+#include <exception>
+#include <memory>
+#include <optional>
+#include <vector>
+
+#include "apps/slam/frame_registration.h"
+#include "rotodom/motion_blur/blurred_patch.h"
+#include "rotodom/motion_blur/keypoint_blur.h"
+
+namespace rotslam {
+namespace {
+
+// The frames next to one: before and behind, or the next two where there is none on one side.
+std::array<FrameId, 2> NextTo(FrameId frame, const RotationMap& cam_from_world) {
+  const int value = frame.value;
+  if (!cam_from_world.contains(FrameId{value - 1})) return {FrameId{value + 1}, FrameId{value + 2}};
+  if (!cam_from_world.contains(FrameId{value + 1})) return {FrameId{value - 1}, FrameId{value - 2}};
+  return {FrameId{value - 1}, FrameId{value + 1}};
+}
+
+void SetTurnsWhileExposed(const Orientations& orientations, MapViews& views) {
+  if (!(orientations.exposure_s > 0.0)) return;
+  const auto time_s = [&](FrameId id) { return orientations.timestamps_s[id.value]; };
+  for (auto& [frame, view] : views) {
+    const auto rate = RateOf(frame, orientations.cam_from_world, time_s, kFarthestFrameForBlur_s);
+    if (rate) view.turn_while_exposed = orientations.exposure_s * *rate;
+  }
+}
+
+}  // namespace
+
+MapViews ReadMapViews(const std::string& path,
+                      const SequenceOptions& options,
+                      const std::set<FrameId>& frames,
+                      const std::function<void(const std::string&)>& tell) {
+  MapViews views;
+  try {
+    const std::unique_ptr<Sequence> sequence = OpenSequence(path, options);
+    int next = 0;
+    for (const FrameId wanted : frames) {
+      sequence->Skip(wanted.value - next);
+      next = wanted.value + 1;
+      const std::optional<Frame> frame = sequence->Next();
+      if (!frame) {
+        tell(path + ": ends before frame " + std::to_string(wanted.value));
+        return views;
+      }
+      if (frame->image.empty()) {
+        tell(path + ": " + frame->name + ": " + frame->problem);
+        continue;
+      }
+      views[wanted] = MakeMapView(frame->image);
+    }
+  } catch (const std::exception& error) {
+    tell(error.what());
+  }
+  return views;
+}
+
+void SetMotions(const MotionSources& sources, const Reconstruction& map, MapViews& views) {
+  SetTurnsWhileExposed(sources.orientations, views);
+  if (sources.camera.readout_s == 0.0) return;
+  const RotationMap& cam_from_world = sources.orientations.cam_from_world;
+  const auto time_s = [&](FrameId id) { return sources.orientations.timestamps_s[id.value]; };
+  std::map<FrameId, ResectionStart> starts;
+  for (auto& [frame, view] : views) {
+    constexpr int kOrientations = 4;
+    view.motion = MotionAt(frame, cam_from_world, time_s, kOrientations);
+    const auto center = map.center_in_world.find(frame);
+    if (center == map.center_in_world.end()) continue;
+    for (const FrameId next : NextTo(frame, cam_from_world)) {
+      const auto rotation = cam_from_world.find(next);
+      if (rotation == cam_from_world.end()) continue;
+      ResectionStart& start = starts[next];
+      start.cam_from_world =
+          rotation->second * cam_from_world.at(frame).Inverse() * map.cam_from_world.at(frame);
+      start.center_in_world = center->second;
+    }
+  }
+  const std::map<FrameId, ResectedPose> poses = ResectFrames(starts,
+                                                             map.point_in_world,
+                                                             sources.tracks,
+                                                             sources.camera,
+                                                             sources.resection,
+                                                             sources.num_threads);
+  for (auto& [frame, view] : views) {
+    const auto center = map.center_in_world.find(frame);
+    if (center == map.center_in_world.end()) continue;
+    const TimedOrientation here{time_s(frame), map.cam_from_world.at(frame)};
+    std::vector<TimedOrientation> others;
+    std::vector<TimedOffset> ways;
+    for (const FrameId next : NextTo(frame, cam_from_world)) {
+      const auto pose = poses.find(next);
+      if (pose == poses.end()) continue;
+      others.push_back({time_s(next), pose->second.cam_from_world});
+      ways.push_back({time_s(next) - here.time_s, pose->second.center_in_world - center->second});
+    }
+    // A map may have corrected an orientation.
+    if (others.size() == 2) view.motion = MotionThrough(here, others);
+    view.velocity = PolynomialThrough(ways).col(0);
+  }
+}
+
+std::map<FrameId, Features> DescribeViews(const MapViews& views,
+                                          const Camera& camera,
+                                          const FeatureOptions& options,
+                                          int num_threads) {
+  std::map<FrameId, Features> described;
+  for (const auto& [frame, view] : views) {
+    Features& corners = described[frame];
+    corners = ExtractFeatures(view.image, frame, camera, options, num_threads);
+    corners.rgb = {};
+    MoveToMidFrame(camera, view.motion, corners);
+  }
+  return described;
+}
+
+}  // namespace rotslam

@@ -1,0 +1,37 @@
+#pragma once
+
+#include <vector>
+
+#include "ba/bundle_adjustment.h"
+
+namespace rotslam {
+
+/// What rotations alone make of a sequence.
+struct PureRotationResult {
+  BundleStatus status = BundleStatus::kNotRun;
+  RotationMap cam_from_world;  // of every frame given; the first one stays
+  Camera camera;               // with its lens refined, if that gains enough (LensOptions)
+  bool lens_refined = false;   // whether it did
+  // Tracks, and observations of them, that one direction each explains.
+  int num_directions = 0;
+  int num_observations = 0;
+  double final_cost = 0.0;  // half the sum of robust squared residuals, in sigmas
+
+  [[nodiscard]] bool Usable() const {
+    return status == BundleStatus::kConverged || status == BundleStatus::kIterationLimit;
+  }
+};
+
+/// Bundle adjustment as if the camera never left its place: rotations, a direction for each track,
+/// and the lens where `options.lens` lets any of it move. A turn tells the focal length, which a
+/// path does not: it is free as far as a calibration may be wrong by some percent.
+/// Whether the camera only turns is not decided here: a moving camera gets the best such
+/// explanation, which leaves out most of what it sees.
+/// Source:  Hartley, Self-calibration of stationary cameras, IJCV 1997.
+/// Throws std::invalid_argument as RefineBundle does.
+PureRotationResult RefinePureRotation(const Camera& camera,
+                                      const RotationMap& cam_from_world,
+                                      const std::vector<Track>& tracks,
+                                      const BundleOptions& options);
+
+}  // namespace rotslam

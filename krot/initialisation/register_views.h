@@ -1,0 +1,42 @@
+#pragma once
+
+#include <vector>
+
+#include "krot/initialisation/resection.h"
+#include "krot/initialisation/robust_triangulation.h"
+#include "rotodom/types/maps.h"
+#include "rotodom/types/track.h"
+
+namespace rotslam {
+
+/// When a view or a point can be placed from what is known.
+struct RegistrationOptions {
+  CenterResectionOptions resection;
+  // A view is placed when it sees this many known points and as many agree on its position.
+  int min_points = 6;
+  // Parallax under which a new point counts as known.
+  double min_angle_rad = 0.0175;
+  double threshold_rad = 0.0114;  // bearing error of a point's observations; 8 px at f = 700
+};
+
+/// Resection-intersection: places views one by one from the points known so far, then intersects
+/// the tracks each one completes.
+/// @param order    views wanted, in the order to try; a view that cannot be placed yet waits, and
+///                 when the order fails the view with most known points goes first.
+/// @param centers  centres known at the start; grows.
+/// @return  views that could not be placed, in the order given.
+std::vector<FrameId> RegisterViews(const RotationMap& cam_from_world,
+                                   const std::vector<Track>& tracks,
+                                   const std::vector<FrameId>& order,
+                                   const RegistrationOptions& options,
+                                   CenterMap& centers);
+
+/// The track's sightings by views with a centre; `observations` receives their positions in the
+/// track when given.
+std::vector<Sighting> PlacedSightings(const RotationMap& cam_from_world,
+                                      const CenterMap& centers,
+                                      const Track& track,
+                                      double focal_px,
+                                      std::vector<int>* observations = nullptr);
+
+}  // namespace rotslam

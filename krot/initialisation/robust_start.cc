@@ -1,0 +1,116 @@
+#include "krot/initialisation/robust_start.h"
+
+#include <algorithm>
+#include <stdexcept>
+#include <utility>
+
+#include "krot/interior_point/l1_interior.h"
+#include "rotodom/types/options.h"
+
+namespace rotslam {
+namespace {
+
+// The next round's price of one observation.
+double NextWeight(const MinimaxProblem& problem,
+                  const MinimaxStructure& structure,
+                  const ImageObservation& observation,
+                  double residual,
+                  double gamma) {
+  constexpr double kFloor = 1e-6;  // an observation behind its camera costs next to nothing
+  if (residual == kInfinity) return kFloor;
+  const double depth = problem.R_c_w[observation.view].row(2).dot(
+      structure.point_in_world[observation.point] - structure.center_in_world[observation.view]);
+  const double excess = std::max(0.0, residual - gamma) / gamma;
+  return std::max(kFloor, 1.0 / ((1.0 + excess * excess) * std::max(1.0, depth)));
+}
+
+std::vector<double> NextWeights(const MinimaxProblem& problem,
+                                const RobustStart& start,
+                                double gamma) {
+  std::vector<double> weights;
+  for (std::size_t o = 0; o < problem.observations.size(); ++o) {
+    weights.push_back(
+        NextWeight(problem, start.structure, problem.observations[o], start.residuals[o], gamma));
+  }
+  return weights;
+}
+
+// @param given   where fixed views and points are.
+// @param before  the answer to the program before.
+MinimaxLpResult SolveProgram(const MinimaxProblem& problem,
+                             double gamma,
+                             const std::vector<double>& weights,
+                             const RobustStartOptions& options,
+                             double tolerance,
+                             const MinimaxStructure* given,
+                             const MinimaxStructure* before) {
+  // Half the iterations of one that starts from nothing (L1InteriorOptions).
+  constexpr double kFirstProductNearby = 1e-3;
+  if (options.method == "interior" || given != nullptr) {
+    L1InteriorOptions interior;
+    interior.tolerance = tolerance;
+    if (before != nullptr) interior.first_product = kFirstProductNearby;
+    MinimaxLpResult result = SolveL1SlackInterior(
+        problem, gamma, options.depth_price, weights, interior, before != nullptr ? before : given);
+    if (result.call == LpCallStatus::kCompleted || given != nullptr) return result;
+  }
+  return SolveL1Slack(problem, gamma, options.depth_price, weights, options.lp);
+}
+
+// One program; false leaves the answer of the one before.
+bool SolveRound(const MinimaxProblem& problem,
+                double gamma,
+                const std::vector<double>& weights,
+                const RobustStartOptions& options,
+                const MinimaxStructure* given,
+                RobustStart& start) {
+  // The rounds' answers only set prices.
+  const double tolerance = gamma > 0.0 ? 1e-3 : 1e-6;
+  const MinimaxStructure* const before =
+      start.call == LpCallStatus::kCompleted ? &start.structure : nullptr;
+  MinimaxLpResult lp = SolveProgram(problem, gamma, weights, options, tolerance, given, before);
+  ++start.num_programs;
+  if (lp.call != LpCallStatus::kCompleted) return false;
+  start.call = lp.call;
+  start.structure = std::move(lp.structure);
+  start.residuals.clear();
+  for (const ImageObservation& observation : problem.observations) {
+    start.residuals.push_back(BoxResidual(problem, start.structure, observation));
+  }
+  return true;
+}
+
+}  // namespace
+
+std::optional<std::string> RobustStartOptions::Problem() const {
+  if (method != "interior" && method != "programs") {
+    return "method is '" + method + "', must be interior or programs";
+  }
+  if (max_rounds < 1) return OutOfRange("max_rounds", max_rounds, "at least 1");
+  if (!(depth_price > 0.0)) {
+    return OutOfRange("depth_price", depth_price, "above 0");
+  }
+  return std::nullopt;
+}
+
+RobustStart SolveRobustStart(const MinimaxProblem& problem,
+                             double gamma,
+                             const RobustStartOptions& options,
+                             const MinimaxStructure* given) {
+  if (const auto trouble = options.Problem()) {
+    throw std::invalid_argument("RobustStartOptions: " + *trouble);
+  }
+  if (!(gamma > 0.0)) throw std::invalid_argument("robust start: gamma must be above 0");
+  RobustStart start;
+  std::vector<double> weights;
+  for (bool done = false; !done && start.num_programs < options.max_rounds;) {
+    if (!SolveRound(problem, gamma, weights, options, given, start)) return start;
+    weights = NextWeights(problem, start, gamma);
+    // Where nobody pays, no price matters.
+    done = *std::max_element(start.residuals.begin(), start.residuals.end()) <= 1.01 * gamma;
+  }
+  if (options.use_sharpening) SolveRound(problem, 0.0, weights, options, given, start);
+  return start;
+}
+
+}  // namespace rotslam

@@ -1,0 +1,70 @@
+#include "krot/initialisation/robust_triangulation.h"
+
+#include "rotodom/types/draw.h"
+
+namespace rotslam {
+namespace {
+
+std::vector<int> Agreeing(const std::vector<Sighting>& sightings,
+                          const Eigen::Vector3d& point,
+                          double threshold_rad) {
+  std::vector<int> inliers;
+  for (std::size_t k = 0; k < sightings.size(); ++k) {
+    if (BearingError(sightings[k], point) <= threshold_rad) inliers.push_back(static_cast<int>(k));
+  }
+  return inliers;
+}
+
+std::vector<Sighting> Pick(const std::vector<Sighting>& sightings, const std::vector<int>& chosen) {
+  std::vector<Sighting> picked;
+  picked.reserve(chosen.size());
+  for (const int k : chosen) picked.push_back(sightings[k]);
+  return picked;
+}
+
+}  // namespace
+
+std::optional<RobustPoint> TriangulateRobustly(const std::vector<Sighting>& sightings,
+                                               double min_angle_rad,
+                                               double threshold_rad) {
+  const int count = static_cast<int>(sightings.size());
+  if (count < 2) return std::nullopt;
+  if (const auto point = Triangulate(sightings, min_angle_rad)) {
+    std::vector<int> inliers = Agreeing(sightings, *point, threshold_rad);
+    if (static_cast<int>(inliers.size()) == count) return RobustPoint{*point, std::move(inliers)};
+  }
+  if (count < 3) return std::nullopt;
+  std::vector<int> best;
+  const auto propose = [&](int a, int b) {
+    const auto point = Triangulate({sightings[a], sightings[b]}, 0.5 * min_angle_rad);
+    if (!point) return;
+    std::vector<int> inliers = Agreeing(sightings, *point, threshold_rad);
+    if (inliers.size() > best.size()) best = std::move(inliers);
+  };
+  propose(0, count - 1);
+  propose(0, count / 2);
+  propose(count / 2, count - 1);
+  // Every pair of a short track, fifteen of a long one.
+  if (count <= 6) {
+    for (int a = 0; a < count; ++a) {
+      for (int b = a + 1; b < count; ++b) propose(a, b);
+    }
+  } else {
+    Draw draw(static_cast<std::uint64_t>(count));
+    for (int trial = 0; trial < 15; ++trial) {
+      const int a = draw.Index(count);
+      const int b = draw.Index(count);
+      if (a != b) propose(a, b);
+    }
+  }
+  if (2 * static_cast<int>(best.size()) <= count || best.size() < 2) return std::nullopt;
+  const auto refitted = Triangulate(Pick(sightings, best), min_angle_rad);
+  if (!refitted) return std::nullopt;
+  best = Agreeing(sightings, *refitted, threshold_rad);
+  if (2 * static_cast<int>(best.size()) <= count || best.size() < 2) return std::nullopt;
+  const std::vector<Sighting> kept = Pick(sightings, best);
+  if (TriangulationAngle(kept, *refitted) < min_angle_rad) return std::nullopt;
+  return RobustPoint{*refitted, std::move(best)};
+}
+
+}  // namespace rotslam

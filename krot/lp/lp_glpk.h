@@ -1,0 +1,10 @@
+#pragma once
+
+#include "krot/lp/lp.h"
+
+namespace rotslam {
+
+/// SolveLp by GLPK: the status, primal and dual of `result`.
+void SolveWithGlpk(const LinearProgram& program, const LpOptions& options, LpResult& result);
+
+}  // namespace rotslam

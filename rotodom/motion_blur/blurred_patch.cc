@@ -1,0 +1,148 @@
+#include "rotodom/motion_blur/blurred_patch.h"
+
+#include <algorithm>
+#include <cmath>
+#include <cstdint>
+#include <vector>
+
+#include <Eigen/Dense>
+
+namespace rotslam {
+namespace {
+
+// Rows of windows are whole numbers of these.
+constexpr int kLanes = 8;
+using Lanes = Eigen::Map<Eigen::Array<float, kLanes, 1>>;
+
+int RoundedUp(int size) { return (size + kLanes - 1) / kLanes * kLanes; }
+
+// A part of an image around a point, blurred.
+struct BlurredWindow {
+  cv::Mat pixels;
+  Eigen::Vector2d origin_px;  // where its first pixel is in the image
+};
+
+// Weight of the pixel at an offset.
+struct Tap {
+  Eigen::Vector2i offset;
+  float weight;
+};
+
+// The mean along a blur vector, bilinear between pixels.
+std::vector<Tap> TapsOf(const Eigen::Vector2d& blur_px) {
+  // Two steps at least: short blur vectors smooth a little, not all at once.
+  const int num_steps =
+      blur_px.isZero() ? 1 : std::max(2, static_cast<int>(std::ceil(blur_px.norm())));
+  std::vector<Tap> taps;
+  const auto add = [&](const Eigen::Vector2i& offset, double weight) {
+    if (weight == 0.0) return;
+    // Steps of up to a pixel: only the last two can have used it, too.
+    constexpr std::ptrdiff_t kRecent = 8;
+    const auto recent = taps.end() - std::min(kRecent, std::ssize(taps));
+    auto tap = std::find_if(recent, taps.end(), [&](const Tap& t) { return t.offset == offset; });
+    if (tap == taps.end()) tap = taps.insert(tap, {offset, 0.0F});
+    tap->weight += static_cast<float>(weight / num_steps);
+  };
+  for (int step = 0; step < num_steps; ++step) {
+    const Eigen::Vector2d at = ((step + 0.5) / num_steps - 0.5) * blur_px;
+    const Eigen::Vector2i whole = at.array().floor().cast<int>();
+    const Eigen::Vector2d part = at - whole.cast<double>();
+    add(whole, (1.0 - part.x()) * (1.0 - part.y()));
+    add(whole + Eigen::Vector2i(1, 0), part.x() * (1.0 - part.y()));
+    add(whole + Eigen::Vector2i(0, 1), (1.0 - part.x()) * part.y());
+    add(whole + Eigen::Vector2i(1, 1), part.x() * part.y());
+  }
+  return taps;
+}
+
+// Row by row; beyond its border the image goes on as it ends there.
+std::vector<float> CopyWindow(const cv::Mat& image,
+                              const Eigen::Vector2i& origin,
+                              const Eigen::Vector2i& size) {
+  const bool is_inside = origin.x() >= 0 && origin.x() + size.x() <= image.cols;
+  std::vector<float> window(static_cast<std::size_t>(size.x()) * size.y());
+  float* to = window.data();
+  for (int y = origin.y(); y < origin.y() + size.y(); ++y, to += size.x()) {
+    const std::uint8_t* row = image.ptr<std::uint8_t>(std::clamp(y, 0, image.rows - 1));
+    if (is_inside) {
+      std::copy(row + origin.x(), row + origin.x() + size.x(), to);
+      continue;
+    }
+    for (int x = 0; x < size.x(); ++x) {
+      to[x] = static_cast<float>(row[std::clamp(origin.x() + x, 0, image.cols - 1)]);
+    }
+  }
+  return window;
+}
+
+// The mean of the image along the blur vector, for each pixel within `half_side` of the centre.
+BlurredWindow BlurVectorAround(const cv::Mat& image,
+                               const Eigen::Vector2d& center_px,
+                               const Eigen::Vector2d& blur_px,
+                               int half_side) {
+  const int side = 2 * half_side + 1;
+  const int stride = RoundedUp(side);
+  const Eigen::Vector2i margin = (0.5 * blur_px.cwiseAbs()).array().ceil().cast<int>() + 1;
+  const Eigen::Vector2i origin(static_cast<int>(std::lround(center_px.x())) - half_side,
+                               static_cast<int>(std::lround(center_px.y())) - half_side);
+  const Eigen::Vector2i size(stride + 2 * margin.x(), side + 2 * margin.y());
+  std::vector<float> pixels = CopyWindow(image, origin - margin, size);
+  std::vector<float> mean(static_cast<std::size_t>(side) * stride, 0.5F);  // rounds
+  for (const Tap& tap : TapsOf(blur_px)) {
+    const Eigen::Vector2i first = margin + tap.offset;
+    for (int y = 0; y < side; ++y) {
+      float* from =
+          pixels.data() + static_cast<std::ptrdiff_t>(first.y() + y) * size.x() + first.x();
+      float* to = mean.data() + static_cast<std::ptrdiff_t>(y) * stride;
+      for (int x = 0; x < stride; x += kLanes) Lanes(to + x) += tap.weight * Lanes(from + x);
+    }
+  }
+  BlurredWindow blurred{cv::Mat(side, stride, CV_8U), origin.cast<double>()};
+  std::copy(mean.begin(), mean.end(), blurred.pixels.data);
+  return blurred;
+}
+
+}  // namespace
+
+bool AreBlurredAlike(const Eigen::Matrix2d& target_from_view,
+                     const Eigen::Vector2d& blur_in_view,
+                     const Eigen::Vector2d& blur_in_target) {
+  constexpr double kDifferenceThatShowsPx = 0.5;
+  const Eigen::Vector2d blur_vector = target_from_view * blur_in_view;
+  // Nobody sees which way something moved.
+  return std::min((blur_vector - blur_in_target).norm(), (blur_vector + blur_in_target).norm()) <=
+         kDifferenceThatShowsPx;
+}
+
+std::optional<PatchAlignment> AlignBlurredPatch(const BlurredPatch& patch,
+                                                const cv::Mat& target,
+                                                const Eigen::Vector2d& start_px,
+                                                const Eigen::Vector2d& blur_px,
+                                                double max_step_px) {
+  // At the border of what a lens model is good for, blur vectors and warps may be anything.
+  constexpr double kLongestBlurPx = 4.0 * kPatchSide;
+  constexpr double kMostStretch = 4.0;
+  // What a patch reaches beyond its centre: half of it, a pixel for gradients and two for rounding.
+  constexpr int kReach = kPatchSide / 2 + 3;
+  const Eigen::Matrix2d view_from_target = patch.target_from_view.inverse();
+  const Eigen::Vector2d blur_in_view = view_from_target * blur_px;
+  const Eigen::Vector2d blur_in_target = patch.target_from_view * patch.blur_px;
+  const double stretch = view_from_target.cwiseAbs().rowwise().sum().maxCoeff();
+  const double longest_px = std::max(blur_in_view.norm(), blur_in_target.norm());
+  if (!(longest_px <= kLongestBlurPx && stretch <= kMostStretch)) return std::nullopt;
+  const BlurredWindow from =
+      BlurVectorAround(patch.image,
+                       patch.center_px,
+                       blur_in_view,
+                       static_cast<int>(std::ceil(std::max(1.0, stretch) * kReach)));
+  const auto sampled =
+      PatchTemplate::Sample(from.pixels, patch.center_px - from.origin_px, patch.target_from_view);
+  if (!sampled) return std::nullopt;
+  const BlurredWindow in = BlurVectorAround(
+      target, start_px, blur_in_target, kReach + static_cast<int>(std::ceil(max_step_px)));
+  auto found = AlignPatch(*sampled, in.pixels, start_px - in.origin_px, max_step_px);
+  if (found) found->center_px += in.origin_px;
+  return found;
+}
+
+}  // namespace rotslam

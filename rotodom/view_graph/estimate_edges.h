@@ -1,0 +1,89 @@
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <optional>
+#include <span>
+#include <string>
+#include <vector>
+
+#include "rotodom/features/features.h"
+#include "rotodom/relative_rotation/relative_rotation.h"
+#include "rotodom/tracks/tracks.h"
+#include "rotodom/types/maps.h"
+#include "rotodom/types/view_graph.h"
+
+namespace rotslam {
+
+/// Which earlier views a new one is tied to, and by what edges.
+struct ViewGraphOptions {
+  // A new frame is matched against this many frames before it; the paper's |F|.
+  int window_frames = 4;
+  // An edge needs more inliers than this (the paper's theta_matches). A frame that gets no such
+  // edge takes the best one it has with at least RelativeRotationOptions::min_inliers, and is
+  // flagged.
+  int min_edge_inliers = 100;
+  // An edge needs this share of the points that both views show. Points are looked for where they
+  // are expected, so chance alone makes up to a third of wrong ones agree; of right ones nine in
+  // ten do, at old keyframes two in three.
+  double min_inlier_ratio = 0.5;
+  // Edges to older keyframes, oldest first, as long as they share more than min_edge_inliers
+  // points with the frame. They hold the drift where the camera stays in one place.
+  int max_keyframe_edges = 3;
+  // A frame that shares less than this part of its points with the last keyframe becomes the next.
+  double keyframe_overlap = 0.7;
+  // Keyframes remembered.
+  int max_keyframes = 8;
+
+  std::optional<std::string> Problem() const;
+
+  template <class Visitor>
+  void Visit(Visitor&& visit) {
+    visit("window_frames", window_frames);
+    visit("min_edge_inliers", min_edge_inliers);
+    visit("min_inlier_ratio", min_inlier_ratio);
+    visit("max_keyframe_edges", max_keyframe_edges);
+    visit("keyframe_overlap", keyframe_overlap);
+    visit("max_keyframes", max_keyframes);
+  }
+};
+
+/// A measured edge of the view-graph together with the matches it rests on.
+struct EdgeWithMatches {
+  RelativeRotation edge;
+  EdgeMatches matches;          // those that agree with the edge
+  std::vector<int> outliers_j;  // keypoints of frame j whose match does not
+};
+
+/// Of edges between pairs of views.
+struct EdgeOptions {
+  RelativeRotationOptions relative_rotation;
+  std::uint64_t seed = 1;
+  int num_threads = 1;
+};
+
+/// The edge between two views from keypoints that seem to show the same points.
+/// @param keypoints  of view_i and of view_j.
+/// @param noise      one for each of them, or none: then they are all alike.
+/// @return  nullopt when fewer than relative_rotation.min_inliers of them agree.
+std::optional<EdgeWithMatches> EstimateEdge(const Features& view_i,
+                                            const Features& view_j,
+                                            const std::vector<std::array<int, 2>>& keypoints,
+                                            const Rotation& predicted_j_from_i,
+                                            double focal_px,
+                                            const EdgeOptions& options,
+                                            std::span<const MatchNoise> noise = {});
+
+/// Estimates the relative rotations between `view` and each of `others` from the points that both
+/// show. Where those allow two rotations, the one that agrees with the other pairs is taken
+/// (ChooseConsistent).
+/// @param predicted_cam_from_world  start orientations of all views concerned.
+/// @return  one connection per other view that agrees on at least relative_rotation.min_inliers
+///          points, in the order of `others`; the thread count does not change it.
+std::vector<EdgeWithMatches> EstimateEdges(const Features& view,
+                                           const std::vector<const Features*>& others,
+                                           const RotationMap& predicted_cam_from_world,
+                                           double focal_px,
+                                           const EdgeOptions& options);
+
+}  // namespace rotslam
