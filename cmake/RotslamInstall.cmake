@@ -4,8 +4,9 @@ include(CMakePackageConfigHelpers)
 get_property(installed_targets GLOBAL PROPERTY ROTSLAM_INSTALLED_TARGETS)
 install(TARGETS ${installed_targets} EXPORT rotslamTargets)
 install(EXPORT rotslamTargets NAMESPACE rotslam:: DESTINATION ${CMAKE_INSTALL_LIBDIR}/cmake/rotslam)
-foreach(folder rotodom krot ba output)
-  install(DIRECTORY ${PROJECT_SOURCE_DIR}/${folder} DESTINATION ${CMAKE_INSTALL_INCLUDEDIR}/rotslam
+foreach(folder rotodom krot ba output apps/slam)
+  cmake_path(GET folder PARENT_PATH parent)
+  install(DIRECTORY ${PROJECT_SOURCE_DIR}/${folder} DESTINATION ${CMAKE_INSTALL_INCLUDEDIR}/rotslam/${parent}
     FILES_MATCHING PATTERN "*.h")
 endforeach()
 

@@ -4,7 +4,7 @@
 #include <string>
 #include <vector>
 
-#include "apps/cli/input/pipeline.h"
+#include "apps/cli/input/run_options.h"
 
 namespace rotslam {
 
@@ -20,7 +20,7 @@ struct BatchEntry {
   std::string vocabulary;
   std::string config;  // YAML file that overrides option defaults
   // The defaults, overridden by `config` and then by the list itself.
-  PipelineOptions options;
+  RunOptions options;
 
   template <class Visitor>
   void Visit(Visitor&& visit) {

@@ -4,15 +4,12 @@
 
 namespace rotslam {
 
-FrameStream::FrameStream(Sequence& sequence, LoopedOdometry& odometry, Checkpoint* checkpoint)
-    : sequence_(sequence),
-      odometry_(odometry),
-      checkpoint_(checkpoint),
-      is_replaying_(checkpoint != nullptr) {}
+FrameStream::FrameStream(FrameSource& frames, LoopedOdometry& odometry, FrameLog* log)
+    : frames_(frames), odometry_(odometry), log_(log), is_replaying_(log != nullptr) {}
 
 std::optional<FrameStream::Step> FrameStream::Next(bool needs_points) {
   if (is_replaying_) {
-    if (std::optional<RecordedFrame> recorded = checkpoint_->NextRecorded()) {
+    if (std::optional<RecordedFrame> recorded = log_->NextRecorded()) {
       ++num_recorded_;
       LoopedEstimate estimate = odometry_.Replay(std::move(recorded->record));
       estimate.points = std::move(recorded->points);
@@ -20,13 +17,13 @@ std::optional<FrameStream::Step> FrameStream::Next(bool needs_points) {
     }
     is_replaying_ = false;
     if (num_recorded_ > 0) {
-      checkpoint_->Restore(odometry_);
-      sequence_.Skip(num_recorded_);
+      log_->Restore(odometry_);
+      frames_.Skip(num_recorded_);
     }
   }
-  std::optional<Frame> frame = sequence_.Next();
+  std::optional<Frame> frame = frames_.Next();
   if (!frame) return std::nullopt;
-  const bool records = checkpoint_ != nullptr && checkpoint_->IsOn();
+  const bool records = log_ != nullptr && log_->IsOn();
   RecordedFrame recorded;
   Step step;
   step.estimate = odometry_.AddFrame(
@@ -36,13 +33,13 @@ std::optional<FrameStream::Step> FrameStream::Next(bool needs_points) {
   if (!records) return step;
   recorded.frame = step.frame;
   if (needs_points) recorded.points = step.estimate.points;
-  checkpoint_->Append(recorded);
-  if (checkpoint_->IsDue()) Commit();
+  log_->Append(recorded);
+  if (log_->IsDue()) Commit();
   return step;
 }
 
 void FrameStream::Commit() {
-  if (checkpoint_ != nullptr && checkpoint_->IsOn()) checkpoint_->Commit(odometry_.SaveState());
+  if (log_ != nullptr && log_->IsOn()) log_->Commit(odometry_.SaveState());
 }
 
 }  // namespace rotslam

@@ -2,21 +2,21 @@
 
 #include <optional>
 
-#include "apps/cli/run_directory/checkpoint.h"
+#include "apps/slam/frame_log.h"
+#include "apps/slam/frame_source.h"
 #include "rotodom/loop/looped_odometry.h"
-#include "rotodom/sequence/sequence.h"
 
 namespace rotslam {
 
-/// A sequence's frames on their way through the odometry: first those that the checkpoint has, as
-/// they were found then, and from there on the images, which are recorded in turn.
+/// Takes frames through the odometry: first those that the log has, as they were found then, and
+/// from there on the images, which are recorded in turn.
 class FrameStream {
  public:
-  /// @param checkpoint  null: the images from the first one on, nothing is recorded.
-  FrameStream(Sequence& sequence, LoopedOdometry& odometry, Checkpoint* checkpoint);
+  /// @param log  null: the images from the first one on, nothing is recorded.
+  FrameStream(FrameSource& frames, LoopedOdometry& odometry, FrameLog* log);
 
   struct Step {
-    Frame frame;  // without the image, which has done its work
+    Frame frame;  // without the image
     LoopedEstimate estimate;
   };
   /// The next frame; nullopt after the last.
@@ -27,9 +27,9 @@ class FrameStream {
   void Commit();
 
  private:
-  Sequence& sequence_;
+  FrameSource& frames_;
   LoopedOdometry& odometry_;
-  Checkpoint* checkpoint_;
+  FrameLog* log_;
   int num_recorded_ = 0;
   bool is_replaying_;
 };

@@ -5,13 +5,16 @@
 #include <functional>
 #include <stdexcept>
 
-#include "output/trajectory/metrics.h"
 #include "rotodom/types/median.h"
 #include "rotodom/types/text_file.h"
 
 namespace rotslam {
 namespace {
 
+// An orientation this near in time counts as the frame's own, whatever the gap, s.
+constexpr double kExactS = 1e-4;
+// Longest gap that is interpolated over, s: motion capture and IMUs run at 100 Hz and more.
+constexpr double kMaxGapS = 0.2;
 // Below this, no reading of a file is called wrong: noise decides between them.
 constexpr double kMinDisagreementDeg = 0.5;
 // How many times better another reading must fit before it is believed.
@@ -72,30 +75,23 @@ void RefuseOtherConventions(const std::string& file,
 
 }  // namespace
 
-GivenRotations MatchGivenRotations(const std::string& file,
-                                   const std::vector<StampedRotation>& given,
+GivenRotations MatchGivenRotations(const OrientationsFromElsewhere& elsewhere,
                                    const std::vector<double>& timestamps_s,
                                    const ViewGraph& graph) {
+  const std::string& file = elsewhere.name;
+  const std::vector<StampedRotation>& given = elsewhere.rotations;
   Trajectory theirs;
   theirs.reserve(given.size());
   for (const StampedRotation& rotation : given) {
     theirs.push_back({rotation.timestamp_s, rotation.world_from_cam, Eigen::Vector3d::Zero()});
   }
-  Trajectory frames;
-  frames.reserve(timestamps_s.size());
-  for (const double timestamp_s : timestamps_s) frames.push_back({timestamp_s, {}, {0, 0, 0}});
-  const MetricsOptions options;
-  const std::vector<PosePair> pairs = AssociatePoses(theirs, frames, options);
-
   GivenRotations result;
   result.file = file;
-  std::size_t next = 0;
   std::size_t num_missing = 0;
   std::size_t first_missing = 0;
   for (std::size_t k = 0; k < timestamps_s.size(); ++k) {
-    if (next < pairs.size() && pairs[next].estimate.timestamp_s == timestamps_s[k]) {
-      result.cam_from_world[FrameId{static_cast<int>(k)}] =
-          pairs[next++].ground_truth.world_from_cam.Inverse();
+    if (const auto pose = PoseAt(theirs, timestamps_s[k], kExactS, kMaxGapS)) {
+      result.cam_from_world[FrameId{static_cast<int>(k)}] = pose->world_from_cam.Inverse();
     } else if (num_missing++ == 0) {
       first_missing = k;
     }
@@ -107,16 +103,16 @@ GivenRotations MatchGivenRotations(const std::string& file,
         std::to_string(first_missing) + " at " + FormatNumber("%.6f", timestamps_s[first_missing]) +
         " s; the file reaches from " + FormatNumber("%.6f", given.front().timestamp_s) + " to " +
         FormatNumber("%.6f", given.back().timestamp_s) + " s, gaps of up to " +
-        FormatNumber("%g", options.max_gap_s) + " s are bridged");
+        FormatNumber("%g", kMaxGapS) + " s are bridged");
   }
   for (std::size_t k = 0; k < timestamps_s.size(); ++k) {
     const auto at = std::lower_bound(given.begin(),
                                      given.end(),
-                                     timestamps_s[k] - options.exact_s,
+                                     timestamps_s[k] - kExactS,
                                      [](const StampedRotation& rotation, double time_s) {
                                        return rotation.timestamp_s < time_s;
                                      });
-    if (at == given.end() || at->timestamp_s > timestamps_s[k] + options.exact_s) continue;
+    if (at == given.end() || at->timestamp_s > timestamps_s[k] + kExactS) continue;
     if (!at->sigma_deg) continue;
     const Eigen::Vector3d sigma_rad = *at->sigma_deg * kRadFromDeg;
     result.covariance[FrameId{static_cast<int>(k)}] =

@@ -6,11 +6,17 @@
 
 #include <Eigen/Core>
 
-#include "output/trajectory/orientation_file.h"
 #include "rotodom/types/maps.h"
+#include "rotodom/types/trajectory.h"
 #include "rotodom/types/view_graph.h"
 
 namespace rotslam {
+
+/// Orientations from a gimbal, an IMU or another system.
+struct OrientationsFromElsewhere {
+  std::string name;                        // of their file, for messages
+  std::vector<StampedRotation> rotations;  // timestamps ascending, two or more
+};
 
 /// Orientations that come from elsewhere, and how they fit the images.
 struct GivenRotations {
@@ -20,15 +26,13 @@ struct GivenRotations {
   double disagreement_deg = 0.0;                  // median angle between them and the edges
 };
 
-/// The file's orientations at the times of the frames, interpolated as `rotslam eval` does (over
-/// gaps of at most 0.2 s).
+/// The given orientations at the times of the frames, interpolated over gaps of at most 0.2 s.
 /// @param timestamps_s  by frame id.
-/// @param graph         what the images say of the turns between frames: when it fits the file far
+/// @param graph         relative rotations of the images: where they fit the given orientations far
 ///                      better in another convention, that is an error that names it.
-/// Throws std::runtime_error in one line: the reader's reasons, frames that the file does not
-/// cover, a convention that is not ours.
-GivenRotations MatchGivenRotations(const std::string& file,
-                                   const std::vector<StampedRotation>& given,
+/// Throws std::runtime_error in one line: frames that the orientations do not cover, a convention
+/// that is not ours.
+GivenRotations MatchGivenRotations(const OrientationsFromElsewhere& given,
                                    const std::vector<double>& timestamps_s,
                                    const ViewGraph& graph);
 

@@ -1,12 +1,10 @@
 #include "apps/slam/map_views.h"
 
 #include <array>
-#include <exception>
-#include <memory>
 #include <optional>
 #include <vector>
 
-#include "apps/slam/frame_registration.h"
+#include "apps/slam/map/resect_frames.h"
 #include "rotodom/motion_blur/blurred_patch.h"
 #include "rotodom/motion_blur/keypoint_blur.h"
 
@@ -32,31 +30,14 @@ void SetTurnsWhileExposed(const Orientations& orientations, MapViews& views) {
 
 }  // namespace
 
-MapViews ReadMapViews(const std::string& path,
-                      const SequenceOptions& options,
+MapViews ReadMapViews(ImageProvider& images,
                       const std::set<FrameId>& frames,
-                      const std::function<void(const std::string&)>& tell) {
+                      const std::function<void(const std::string& problem)>& tell) {
   MapViews views;
-  try {
-    const std::unique_ptr<Sequence> sequence = OpenSequence(path, options);
-    int next = 0;
-    for (const FrameId wanted : frames) {
-      sequence->Skip(wanted.value - next);
-      next = wanted.value + 1;
-      const std::optional<Frame> frame = sequence->Next();
-      if (!frame) {
-        tell(path + ": ends before frame " + std::to_string(wanted.value));
-        return views;
-      }
-      if (frame->image.empty()) {
-        tell(path + ": " + frame->name + ": " + frame->problem);
-        continue;
-      }
-      views[wanted] = MakeMapView(frame->image);
-    }
-  } catch (const std::exception& error) {
-    tell(error.what());
-  }
+  images.Read(
+      frames,
+      [&](FrameId frame, const cv::Mat& image) { views[frame] = MakeMapView(image); },
+      tell);
   return views;
 }
 

@@ -5,21 +5,19 @@
 #include <set>
 #include <string>
 
+#include "apps/slam/frame_source.h"
 #include "apps/slam/orientations.h"
 #include "ba/resection.h"
 #include "rotodom/features/features.h"
-#include "rotodom/sequence/sequence.h"
 #include "rotodom/track_completion/track_completion.h"
 
 namespace rotslam {
 
-/// The images of `frames`, read anew.
-/// @param path  of the sequence; `options` as it was read the first time.
+/// Views of `frames`, of images read anew.
 /// @param tell  receives one line for each image that cannot be read again; the rest are there.
-MapViews ReadMapViews(const std::string& path,
-                      const SequenceOptions& options,
+MapViews ReadMapViews(ImageProvider& images,
                       const std::set<FrameId>& frames,
-                      const std::function<void(const std::string&)>& tell);
+                      const std::function<void(const std::string& problem)>& tell);
 
 /// What tells how the camera moved around the views of a map.
 struct MotionSources {

@@ -1,12 +1,8 @@
 #include "apps/slam/orientations.h"
 
 #include <algorithm>
-#include <array>
 #include <cmath>
-#include <cstdint>
-#include <cstdio>
 #include <iterator>
-#include <set>
 #include <stdexcept>
 #include <utility>
 
@@ -81,159 +77,33 @@ std::map<FrameId, Features> DoubtfulPlaces(std::map<FrameId, Features> places,
   return places;
 }
 
-// Loops right round measure the scale of all turns.
-void WarnOfTurnScale(const std::vector<LoopCheck>& loops, Progress& progress) {
-  constexpr double kNotable = 0.02;
-  std::vector<double> scales;
-  for (const LoopCheck& loop : loops) {
-    if (loop.accepted && loop.way.turn_scale != 1.0) scales.push_back(loop.way.turn_scale);
-  }
-  const double scale = Median(scales, 1.0);
-  if (std::abs(scale - 1.0) < kNotable) return;
-  std::array<char, 160> text = {};
-  std::snprintf(text.data(),
-                text.size(),
-                "turns around %zu closed loops come out %.1f %% too %s: check the focal length, "
-                "which seems too %s",
-                scales.size(),
-                100.0 * std::abs(scale - 1.0),
-                scale > 1.0 ? "small" : "large",
-                scale > 1.0 ? "long" : "short");
-  progress.Warn(text.data());
-}
-
-// What runs past while the sequence is read.
-class LiveCounters {
- public:
-  explicit LiveCounters(const PureRotationOptions& held) : held_(held) {}
-
-  std::vector<std::string> Update(const LoopedEstimate& estimate, const OdometryResult& result) {
-    num_loops_ += std::count_if(estimate.loops.begin(),
-                                estimate.loops.end(),
-                                [](const LoopCheck& check) { return check.accepted; });
-    // A look takes time in proportion to what has been read: rarer and rarer, so that all of them
-    // together do, too.
-    constexpr int kFramesBetweenLooks = 30;
-    if (estimate.frame.value >= next_look_) {
-      num_segments_ = CountSegments(result);
-      next_look_ = estimate.frame.value + std::max(kFramesBetweenLooks, estimate.frame.value / 10);
-    }
-    return {std::to_string(estimate.report.num_inliers) + " inliers",
-            Counted(num_loops_, "loop"),
-            Counted(num_segments_, "segment")};
-  }
-
- private:
-  static std::string Counted(std::int64_t count, const std::string& what) {
-    return std::to_string(count) + " " + what + (count == 1 ? "" : "s");
-  }
-
-  // Stretches on which the camera moves, or does not.
-  std::int64_t CountSegments(const OdometryResult& result) const {
-    const RotationMap& cam_from_world = result.cam_from_world;
-    std::int64_t count = 0;
-    int next = cam_from_world.begin()->first.value;
-    for (const PureRotationSegment& stretch :
-         FindPureRotationSegments(result.graph, cam_from_world, held_)) {
-      count += stretch.first.value > next ? 2 : 1;
-      next = stretch.last.value + 1;
-    }
-    return count + (cam_from_world.rbegin()->first.value >= next ? 1 : 0);
-  }
-
-  PureRotationOptions held_;
-  std::int64_t num_loops_ = 0;
-  std::int64_t num_segments_ = 1;
-  int next_look_ = 29;
-};
-
-// What a copy has cut off is missed by nobody; the odd frame is a container's own miscount.
-void WarnOfMissingFrames(int num_frames, int num_announced, Progress& progress) {
-  const int num_missing = num_announced - num_frames;
-  if (num_missing <= std::max(2, num_announced / 100)) return;
-  progress.Warn("the video ends after " + std::to_string(num_frames) + " of the " +
-                std::to_string(num_announced) + " frames it announces; is the file complete?");
-}
-
-void TellDetails(const LoopedEstimate& estimate, Progress& progress) {
-  const FrameReport& report = estimate.report;
-  progress.Detail("frame " + std::to_string(estimate.frame.value) + ": " +
-                  std::to_string(report.num_tracked) + " points tracked, " +
-                  std::to_string(report.num_inliers) + " inliers" +
-                  (report.predicted_only ? ", no edge" : "") + (report.weak ? ", weak" : "") +
-                  (report.searched_wide ? ", searched wide" : "") +
-                  (estimate.has_averaged ? ", drift spread over all orientations" : ""));
-  for (const LoopCheck& check : estimate.loops) {
-    progress.Detail("frame " + std::to_string(check.frame.value) + " looks like frame " +
-                    std::to_string(check.match.value) + ": " + std::to_string(check.num_inliers) +
-                    " inliers, " + std::to_string(check.angle_deg) + " deg around the loop, " +
-                    (check.accepted ? "accepted, " + std::to_string(check.num_edges) + " edges"
-                                    : std::string("not accepted")));
-  }
-}
-
-}  // namespace
-
-Orientations FindOrientations(Input& input,
-                              const PipelineOptions& options,
-                              std::shared_ptr<const Vocabulary> vocabulary,
-                              bool keep_features,
-                              const CommonFlags& flags,
-                              const Interruption& interruption,
-                              Progress& progress,
-                              Checkpoint* checkpoint) {
-  if (checkpoint != nullptr && checkpoint->readout()) SetReadout(*checkpoint->readout(), input);
-  LoopedOdometry odometry(input.camera,
-                          options.rotodom,
-                          options.loop,
-                          vocabulary,
-                          keep_features,
-                          flags.seed,
-                          flags.NumThreads());
-  ReadoutDecision watch(input.camera, options, flags.NumThreads());
-  Orientations orientations;
-  LiveCounters counters(options.pure_rotation_segments);
-  FrameStream frames(*input.sequence, odometry, checkpoint);
-  const int num_announced = input.sequence->NumFrames();
-  const auto start_over = [&] {
-    const ReadoutEstimate& readout = *watch.found();
-    progress.EndStage("the shutter rolls, read out in " + DescribeReadout(readout));
-    progress.Warn(
-        "how the sensor is read out is not known, the images tell it: starts again from the first "
-        "frame with " +
-        CameraLines(readout) + "; in the camera file that spares the second reading");
-    if (checkpoint != nullptr) checkpoint->StartOver(readout);
-    SetReadout(readout, input);
-    input.sequence = OpenSequence(input.path, options.sequence);
-    return FindOrientations(
-        input, options, vocabulary, keep_features, flags, interruption, progress, checkpoint);
-  };
-  progress.StartStage("orientations", num_announced);
-  while (std::optional<FrameStream::Step> step = frames.Next(watch.IsOn())) {
+// Tracks all frames, or as many as the observer lets.
+// @return  the readout, where the images say that the shutter rolls: then nothing else counts.
+std::optional<ReadoutEstimate> TrackFrames(FrameStream& stream,
+                                           LoopedOdometry& odometry,
+                                           ReadoutDecision& decision,
+                                           SlamObserver& observer,
+                                           Orientations& orientations) {
+  while (std::optional<FrameStream::Step> step = stream.Next(decision.IsOn())) {
     auto& [frame, estimate] = *step;
-    if (!frame.problem.empty()) {
-      progress.Warn("frame " + std::to_string(frame.id.value) +
-                    " skipped, its pose is interpolated: " + frame.problem);
-      ++orientations.num_unreadable;
-    }
+    orientations.num_unreadable += frame.problem.empty() ? 0 : 1;
     orientations.timestamps_s.push_back(frame.timestamp_s);
     orientations.image_names.push_back(frame.name);
     orientations.num_weak += estimate.report.weak;
     orientations.reports.push_back(estimate.report);
-    TellDetails(estimate, progress);
-    progress.Step(frame.id.value + 1, counters.Update(estimate, odometry.result()));
-    watch.Add(frame.id, std::move(estimate.points), odometry.result());
-    if (watch.found()) return start_over();
+    observer.OnFrame({frame, estimate, odometry.result()});
+    decision.Add(frame.id, std::move(estimate.points), odometry.result());
+    if (decision.found()) return decision.found();
     orientations.loops.insert(
         orientations.loops.end(), estimate.loops.begin(), estimate.loops.end());
-    orientations.interrupted = interruption.IsRequested();
-    if (orientations.interrupted) {
-      progress.Say("interrupted: putting together what there is; once more ends at once");
-      break;
-    }
+    orientations.interrupted = observer.ShouldStop();
+    if (orientations.interrupted) return std::nullopt;
   }
-  if (!orientations.interrupted) watch.Finish(odometry.result());
-  if (watch.found()) return start_over();
+  decision.Finish(odometry.result());
+  return decision.found();
+}
+
+void TakeResults(LoopedOdometry& odometry, bool keep_features, Orientations& orientations) {
   const std::vector<LoopCheck> last_loops = odometry.Finish();
   orientations.loops.insert(orientations.loops.end(), last_loops.begin(), last_loops.end());
   orientations.num_places = odometry.num_places();
@@ -244,13 +114,10 @@ Orientations FindOrientations(Input& input,
   orientations.loop_seconds = odometry.loop_seconds();
   orientations.global_averaging_seconds = odometry.averaging_seconds();
   static_cast<OdometryResult&>(orientations) = odometry.TakeResult();
+}
 
-  const int num_frames = static_cast<int>(orientations.timestamps_s.size());
-  if (!orientations.interrupted) WarnOfMissingFrames(num_frames, num_announced, progress);
-  if (orientations.interrupted && (num_frames < 3 || orientations.graph.edges().empty())) {
-    throw InterruptedError("interrupted after frame " + std::to_string(num_frames - 1) +
-                           ": too early, nothing is written");
-  }
+void RequireFramesAndEdges(const Orientations& orientations) {
+  const std::size_t num_frames = orientations.timestamps_s.size();
   if (num_frames < 3) {
     throw std::runtime_error("only " + std::to_string(num_frames) +
                              " frames could be read; at least 3 are needed");
@@ -261,46 +128,75 @@ Orientations FindOrientations(Input& input,
         " frames could be matched: the images show too few corners in common; check "
         "that they are in focus, exposed and in order");
   }
-  frames.Commit();
+}
+
+// What is told of frames by all edges together: those without, those interpolated, pieces.
+void JudgeFrames(const OrientationInputs& inputs,
+                 const AveragingOptions& options,
+                 Orientations& orientations) {
   for (const auto& [frame, rotation] : orientations.cam_from_world) {
     if (orientations.graph.EdgesOf(frame).empty()) orientations.unconnected.insert(frame);
   }
-  if (input.given_rotations) {
-    orientations.given = MatchGivenRotations(input.rotations_file,
-                                             *input.given_rotations,
-                                             orientations.timestamps_s,
-                                             orientations.graph);
+  if (inputs.given) {
+    orientations.given =
+        MatchGivenRotations(*inputs.given, orientations.timestamps_s, orientations.graph);
     orientations.cam_from_world = orientations.given->cam_from_world;
     orientations.covariance = orientations.given->covariance;
   }
   InterpolateUnknown(orientations, orientations.unconnected, orientations.cam_from_world);
   orientations.inlier_edges =
-      CountInlierEdges(orientations.graph, orientations.cam_from_world, options.rotodom.averaging);
+      CountInlierEdges(orientations.graph, orientations.cam_from_world, options);
   if (!orientations.given) {
     orientations.breaks = FindBreaks(orientations.graph, orientations.cam_from_world);
   }
-  progress.EndStage(std::to_string(num_frames) + " frames, " +
-                    std::to_string(orientations.graph.edges().size()) + " edges");
-  if (orientations.given) {
-    progress.Say("orientations from " + orientations.given->file + ", " +
-                 std::to_string(orientations.given->disagreement_deg) +
-                 " deg from the edges (median)");
-    WarnOfTurnScale(orientations.loops, progress);
-    return orientations;
+}
+
+// FindOrientations with a camera whose readout is known, or is not asked for by what was read
+// before.
+Orientations FindWithReadout(FrameSource& frames,
+                             const Camera& camera,
+                             const std::optional<ReadoutEstimate>& readout,
+                             const SlamOptions& options,
+                             const OrientationInputs& inputs,
+                             SlamObserver& observer) {
+  Orientations orientations;
+  orientations.readout = readout;
+  orientations.camera = readout ? WithReadout(camera, *readout) : camera;
+  LoopedOdometry odometry(orientations.camera,
+                          options.rotodom,
+                          options.loop,
+                          inputs.vocabulary,
+                          inputs.keep_features,
+                          options.seed,
+                          options.num_threads);
+  ReadoutDecision decision(orientations.camera, options);
+  FrameStream stream(frames, odometry, inputs.log);
+  observer.OnBegin(SlamStage::kOrientations, frames.NumFrames());
+  if (const auto found = TrackFrames(stream, odometry, decision, observer, orientations)) {
+    observer.OnReadoutFound(*found);
+    if (inputs.log != nullptr) inputs.log->StartOver(*found);
+    frames.Rewind();
+    return FindWithReadout(frames, camera, found, options, inputs, observer);
   }
-  // The unreadable ones have had their warning.
-  const int num_unconnected = static_cast<int>(orientations.unconnected.size());
-  if (const int count = num_unconnected - orientations.num_unreadable; count > 0) {
-    progress.Warn(std::to_string(count) +
-                  (count == 1 ? " frame matches no other; its orientation is interpolated"
-                              : " frames match no other; their orientations are interpolated"));
-  }
-  WarnOfTurnScale(orientations.loops, progress);
-  for (const FrameId frame : orientations.breaks) {
-    progress.Warn("frame " + std::to_string(frame.value) +
-                  " matches none before it; the turn across this gap is extrapolated");
-  }
+  TakeResults(odometry, inputs.keep_features, orientations);
+  if (orientations.interrupted && !orientations.IsUsable()) return orientations;
+  RequireFramesAndEdges(orientations);
+  stream.Commit();
+  JudgeFrames(inputs, options.rotodom.averaging, orientations);
+  observer.OnEnd(SlamStage::kOrientations, orientations);
   return orientations;
+}
+
+}  // namespace
+
+Orientations FindOrientations(FrameSource& frames,
+                              const Camera& camera,
+                              const SlamOptions& options,
+                              const OrientationInputs& inputs,
+                              SlamObserver& observer) {
+  std::optional<ReadoutEstimate> readout;
+  if (inputs.log != nullptr) readout = inputs.log->readout();
+  return FindWithReadout(frames, camera, readout, options, inputs, observer);
 }
 
 std::map<FrameId, double> OrientationSigmas(const Orientations& orientations) {
@@ -311,65 +207,13 @@ std::map<FrameId, double> OrientationSigmas(const Orientations& orientations) {
   return sigma_rad;
 }
 
-Trajectory RotationTrajectory(const Orientations& orientations) {
-  Trajectory trajectory;
-  for (const auto& [frame, cam_from_world] : orientations.cam_from_world) {
-    trajectory.push_back({orientations.timestamps_s[frame.value],
-                          cam_from_world.Inverse(),
-                          Eigen::Vector3d::Zero()});
+RotationScale RotationScaleOf(const std::vector<LoopCheck>& loops) {
+  std::vector<double> factors;
+  for (const LoopCheck& loop : loops) {
+    if (loop.accepted && loop.way.turn_scale != 1.0) factors.push_back(loop.way.turn_scale);
   }
-  return trajectory;
-}
-
-std::vector<RotationRow> RotationRows(const Orientations& orientations) {
-  std::vector<RotationRow> rows;
-  rows.reserve(orientations.cam_from_world.size());
-  for (const auto& [frame, cam_from_world] : orientations.cam_from_world) {
-    RotationRow& row = rows.emplace_back();
-    row.frame = frame.value;
-    row.timestamp_s = orientations.timestamps_s[frame.value];
-    row.world_from_cam = cam_from_world.Inverse();
-    row.inlier_edges = orientations.inlier_edges.at(frame);
-    if (const auto known = orientations.covariance.find(frame);
-        known != orientations.covariance.end()) {
-      row.sigma_deg = known->second.diagonal().cwiseSqrt() * kDegFromRad;
-    }
-    const FrameReport& report = orientations.reports[frame.value];
-    if (orientations.given) {
-      row.flags.emplace_back("given");
-    } else if (orientations.graph.EdgesOf(frame).empty()) {
-      row.flags.emplace_back("predicted");
-    }
-    if (report.weak) row.flags.emplace_back("weak");
-    if (report.searched_wide) row.flags.emplace_back("searched_wide");
-    if (std::binary_search(orientations.breaks.begin(), orientations.breaks.end(), frame)) {
-      row.flags.emplace_back("break");
-    }
-    const auto closes_loop = [f = frame](const LoopCheck& check) {
-      return check.accepted && check.frame == f;
-    };
-    if (std::any_of(orientations.loops.begin(), orientations.loops.end(), closes_loop)) {
-      row.flags.emplace_back("loop");
-    }
-  }
-  return rows;
-}
-
-std::vector<LoopRow> LoopRows(const Orientations& orientations) {
-  std::vector<LoopRow> rows;
-  rows.reserve(orientations.loops.size());
-  for (const LoopCheck& check : orientations.loops) {
-    rows.push_back({check.frame.value,
-                    check.match.value,
-                    check.score,
-                    check.num_inliers,
-                    check.angle_deg,
-                    check.accepted,
-                    check.way.turn_scale,
-                    check.way.angle_deg,
-                    check.num_edges});
-  }
-  return rows;
+  const int num_loops = static_cast<int>(factors.size());
+  return {Median(std::move(factors), 1.0), num_loops};
 }
 
 }  // namespace rotslam

@@ -1,7 +1,5 @@
 #include "apps/slam/readout_decision.h"
 
-#include <array>
-#include <cstdio>
 #include <utility>
 
 namespace rotslam {
@@ -15,13 +13,11 @@ constexpr std::size_t kBetweenLooks = 4;
 
 }  // namespace
 
-ReadoutDecision::ReadoutDecision(const Camera& camera,
-                                 const PipelineOptions& options,
-                                 int num_threads)
+ReadoutDecision::ReadoutDecision(const Camera& camera, const SlamOptions& options)
     : camera_(camera),
       options_(options.readout),
       relative_rotation_(options.rotodom.relative_rotation),
-      num_threads_(num_threads),
+      num_threads_(options.num_threads),
       is_on_(options.readout.enabled && !camera.knows_readout),
       next_look_(kFirstLook) {}
 
@@ -50,36 +46,11 @@ void ReadoutDecision::Look(const OdometryResult& result) {
   is_on_ = !found_ && !readout->IsGlobal();
 }
 
-void SetReadout(ReadoutEstimate readout, Input& input) {
-  input.readout = readout;
-  input.camera.readout_s = readout.readout_s;
-  input.camera.readout_from = readout.readout_from;
-  input.camera.knows_readout = true;
-}
-
-std::string DescribeReadout(const ReadoutEstimate& readout) {
-  std::array<char, 96> text = {};
-  std::snprintf(text.data(),
-                text.size(),
-                "%.1f +- %.1f ms from the %s",
-                1e3 * readout.readout_s,
-                1e3 * readout.sigma_s,
-                Name(readout.readout_from));
-  return text.data();
-}
-
-std::string CameraLines(const ReadoutEstimate& readout) {
-  std::array<char, 96> text = {};
-  std::snprintf(text.data(),
-                text.size(),
-                "readout_s: %.4f, readout_from: %s",
-                readout.readout_s,
-                Name(readout.readout_from));
-  return text.data();
-}
-
-SummaryTable SummaryOf(const ReadoutEstimate& readout) {
-  return {{"source", "images"}, {"readout_s", readout.readout_s}, {"sigma_s", readout.sigma_s}};
+Camera WithReadout(Camera camera, const ReadoutEstimate& readout) {
+  camera.readout_s = readout.readout_s;
+  camera.readout_from = readout.readout_from;
+  camera.knows_readout = true;
+  return camera;
 }
 
 }  // namespace rotslam

@@ -2,11 +2,9 @@
 
 #include <map>
 #include <optional>
-#include <string>
 
-#include "apps/cli/input/input.h"
-#include "apps/cli/input/pipeline.h"
-#include "output/tables/summary.h"
+#include "apps/slam/options.h"
+#include "rotodom/camera/camera.h"
 #include "rotodom/odometry.h"
 #include "rotodom/rolling_shutter/readout.h"
 
@@ -17,7 +15,7 @@ namespace rotslam {
 /// read once more.
 class ReadoutDecision {
  public:
-  ReadoutDecision(const Camera& camera, const PipelineOptions& options, int num_threads);
+  ReadoutDecision(const Camera& camera, const SlamOptions& options);
 
   /// Takes the next frame, and at some frames looks at all of them. Nothing once it is off.
   /// @param result  of the odometry, this frame included.
@@ -43,16 +41,7 @@ class ReadoutDecision {
   std::optional<ReadoutEstimate> found_;
 };
 
-/// Gives the input's camera that readout.
-void SetReadout(ReadoutEstimate readout, Input& input);
-
-/// In words: `20.3 +- 0.2 ms from the top`.
-std::string DescribeReadout(const ReadoutEstimate& readout);
-
-/// As a camera file has it: `readout_s: 0.0203, readout_from: top`.
-std::string CameraLines(const ReadoutEstimate& readout);
-
-/// The part of summary.json.
-SummaryTable SummaryOf(const ReadoutEstimate& readout);
+/// The camera with that readout.
+Camera WithReadout(Camera camera, const ReadoutEstimate& readout);
 
 }  // namespace rotslam

@@ -14,30 +14,6 @@
 namespace rotslam {
 namespace {
 
-// Ground truth at time `at`; nullopt where it does not reach.
-std::optional<StampedPose> PoseAt(const Trajectory& ground_truth,
-                                  double at,
-                                  const MetricsOptions& options) {
-  const auto upper = std::lower_bound(
-      ground_truth.begin(), ground_truth.end(), at, [](const StampedPose& pose, double time) {
-        return pose.timestamp_s < time;
-      });
-  // The two samples around `at`, or the two nearest the end that it lies beyond.
-  const auto after =
-      std::clamp(upper, std::next(ground_truth.begin()), std::prev(ground_truth.end()));
-  const StampedPose& a = *std::prev(after);
-  const StampedPose& b = *after;
-  const double gap = b.timestamp_s - a.timestamp_s;
-  const bool exact =
-      std::min(std::abs(a.timestamp_s - at), std::abs(b.timestamp_s - at)) < options.exact_s;
-  const bool inside = a.timestamp_s <= at && at <= b.timestamp_s && gap <= options.max_gap_s;
-  if (!exact && !inside) return std::nullopt;
-  const double weight = std::clamp((at - a.timestamp_s) / std::max(gap, 1e-12), 0.0, 1.0);
-  return StampedPose{at,
-                     Interpolate(a.world_from_cam, b.world_from_cam, weight),
-                     (1.0 - weight) * a.center_in_world + weight * b.center_in_world};
-}
-
 double RootMeanSquare(const std::vector<double>& errors) {
   double sum = 0.0;
   for (const double error : errors) sum += error * error;
@@ -164,9 +140,9 @@ std::vector<PosePair> AssociatePoses(const Trajectory& ground_truth,
     throw std::invalid_argument("MetricsOptions: " + *problem);
   }
   std::vector<PosePair> pairs;
-  if (ground_truth.size() < 2) return pairs;
   for (const StampedPose& pose : estimate) {
-    if (const auto truth = PoseAt(ground_truth, pose.timestamp_s, options)) {
+    const auto truth = PoseAt(ground_truth, pose.timestamp_s, options.exact_s, options.max_gap_s);
+    if (truth) {
       pairs.push_back({*truth, pose});
     }
   }

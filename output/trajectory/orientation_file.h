@@ -1,23 +1,12 @@
 #pragma once
 
 #include <filesystem>
-#include <optional>
 #include <string>
 #include <vector>
 
-#include <Eigen/Core>
-
-#include "rotodom/types/rotation.h"
+#include "rotodom/types/trajectory.h"
 
 namespace rotslam {
-
-/// An orientation at a time, from elsewhere.
-struct StampedRotation {
-  double timestamp_s = 0.0;
-  Rotation world_from_cam;
-  // Standard deviations about the camera's axes; nullopt where the file does not say.
-  std::optional<Eigen::Vector3d> sigma_deg;
-};
 
 /// What a file says of orientations.
 struct OrientationFile {

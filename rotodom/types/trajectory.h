@@ -1,5 +1,6 @@
 #pragma once
 
+#include <optional>
 #include <vector>
 
 #include <Eigen/Core>
@@ -16,5 +17,22 @@ struct StampedPose {
 };
 
 using Trajectory = std::vector<StampedPose>;  // timestamps ascending
+
+/// An orientation at a time.
+struct StampedRotation {
+  double timestamp_s = 0.0;
+  Rotation world_from_cam;
+  // Standard deviations about the camera's axes, deg; nullopt where nothing is known.
+  std::optional<Eigen::Vector3d> sigma_deg;
+};
+
+/// The pose at a time: rotations by spherical linear interpolation, positions linearly.
+/// @param exact_s    a pose this near in time counts as the one asked for, whatever the gap.
+/// @param max_gap_s  largest gap between two poses to interpolate over.
+/// @return  nullopt where the trajectory does not reach, or has fewer than two poses.
+std::optional<StampedPose> PoseAt(const Trajectory& trajectory,
+                                  double timestamp_s,
+                                  double exact_s,
+                                  double max_gap_s);
 
 }  // namespace rotslam

@@ -6,11 +6,11 @@
 #include "apps/batch/list.h"
 #include "apps/batch/record.h"
 #include "apps/cli/input/config.h"
-#include "apps/cli/input/pipeline.h"
+#include "apps/cli/input/focal_guess.h"
+#include "apps/cli/input/run_options.h"
 #include "apps/cli/run_directory/checkpoint.h"
 #include "apps/cli/run_directory/unfinished.h"
 #include "apps/simulation/paths.h"
-#include "apps/slam/focal_guess.h"
 #include "tests/fuzz/fuzz_target.h"
 
 namespace rotslam {
@@ -20,7 +20,7 @@ namespace fs = std::filesystem;
 
 const RegisterFuzzTarget config("config",
                                 [](std::string_view bytes, const TemporaryFolder& folder) {
-                                  PipelineOptions options;
+                                  RunOptions options;
                                   LoadOptionsYaml(folder.Write("options.yaml", std::string(bytes)),
                                                   options);
                                 });

@@ -77,10 +77,10 @@ int InspectSequence(const InspectFlags& flags) {
   SequenceOptions options;
   if (flags.fps) options.fps = *flags.fps;
   Input input;
-  input.sequence = OpenSequence(flags.input, options);
-  const std::optional<Frame> first = input.sequence->Next();
-  input.sequence->Skip(std::numeric_limits<int>::max());
-  for (const std::string& line : DescribeSequence(*input.sequence)) PrintLine(line);
+  input.frames = std::make_unique<SequenceSource>(flags.input, options);
+  const std::optional<Frame> first = input.frames->Next();
+  input.frames->Skip(std::numeric_limits<int>::max());
+  for (const std::string& line : DescribeSequence(input.sequence())) PrintLine(line);
   int exit_code = 0;
   try {
     ReadCalibration(input_flags, input);
@@ -89,7 +89,7 @@ int InspectSequence(const InspectFlags& flags) {
     PrintLine(std::string("camera: ") + error.what());
     exit_code = 1;
   }
-  if (const auto& truth = input.sequence->GroundTruthFile())
+  if (const auto& truth = input.sequence().GroundTruthFile())
     PrintLine("truth:  " + truth->string());
   if (first && first->image.empty()) {
     PrintLine("frame:  " + first->name + " cannot be read: " + first->problem);

@@ -4,15 +4,15 @@
 #include <utility>
 
 #include "apps/cli/command.h"
-#include "apps/cli/input/pipeline.h"
+#include "apps/cli/commands/track_input.h"
+#include "apps/cli/input/run_options.h"
 #include "apps/cli/run_directory/checkpoint.h"
 #include "apps/cli/run_directory/run_directory.h"
 #include "apps/cli/run_directory/run_report.h"
 #include "apps/cli/run_directory/unfinished.h"
 #include "apps/cli/terminal/interruption.h"
 #include "apps/cli/terminal/progress.h"
-#include "apps/slam/focal_guess.h"
-#include "apps/slam/orientations.h"
+#include "apps/cli/terminal/slam_progress.h"
 #include "rotodom/types/stopwatch.h"
 
 namespace rotslam {
@@ -31,27 +31,22 @@ int FindAndWriteRotations(const RotationsFlags& flags) {
   Interruption interruption;
   Progress progress(flags.common);
   // The whole pipeline's options, so that one configuration file serves `run` and `rotations`.
-  PipelineOptions options = ReadPipelineOptions(flags.common, flags.input);
+  RunOptions options = ReadRunOptions(flags.common, flags.input);
   if (!flags.averaging.empty()) options.rotodom.averaging.mode = flags.averaging;
 
   Input input = OpenInput(
       flags.input, options.sequence, [&](const std::string& line) { progress.Say(line); });
   auto vocabulary = OpenVocabulary(flags.input);
   const std::filesystem::path directory = PrepareRunDirectory(flags.input.out);
-  RefineGuess(flags.input, flags.common, options, interruption, progress, input);
+  RefineGuess(options, interruption, progress, input);
   const double guess_s = SecondsSince(start);
   Checkpoint checkpoint(directory,
                         flags.checkpoint,
                         IdentityOf("rotations", input, flags.input, options, flags.common.seed),
                         progress);
-  const Orientations orientations = FindOrientations(input,
-                                                     options,
-                                                     std::move(vocabulary),
-                                                     false,
-                                                     flags.common,
-                                                     interruption,
-                                                     progress,
-                                                     &checkpoint);
+  SlamProgress observer(options, interruption, progress);
+  const Orientations orientations =
+      TrackInput(options, std::move(vocabulary), false, observer, checkpoint, input);
   const UnfinishedOutputs outputs(directory);
   WriteOrientations(outputs.folder(), orientations);
   RunSummary summary = StartSummary("rotations", input, orientations, DescribeOptions(options));

@@ -4,16 +4,18 @@
 #include <utility>
 
 #include "apps/cli/command.h"
-#include "apps/cli/input/pipeline.h"
+#include "apps/cli/commands/track_input.h"
+#include "apps/cli/input/run_options.h"
 #include "apps/cli/run_directory/checkpoint.h"
 #include "apps/cli/run_directory/run_directory.h"
 #include "apps/cli/run_directory/run_report.h"
 #include "apps/cli/run_directory/unfinished.h"
+#include "apps/cli/terminal/describe.h"
 #include "apps/cli/terminal/interruption.h"
 #include "apps/cli/terminal/progress.h"
-#include "apps/slam/focal_guess.h"
-#include "apps/slam/orientations.h"
-#include "apps/slam/positions.h"
+#include "apps/cli/terminal/slam_progress.h"
+#include "apps/slam/build_map.h"
+#include "apps/slam/focal_length.h"
 #include "output/map/ply.h"
 #include "output/trajectory/trajectory.h"
 #include "rotodom/types/stopwatch.h"
@@ -45,28 +47,23 @@ int Run(const RunFlags& flags) {
   const Clock::time_point start = Clock::now();
   Interruption interruption;
   Progress progress(flags.common);
-  PipelineOptions options = ReadPipelineOptions(flags.common, flags.input);
+  RunOptions options = ReadRunOptions(flags.common, flags.input);
   flags.krot.Override(options.krot);
 
   Input input = OpenInput(
       flags.input, options.sequence, [&](const std::string& line) { progress.Say(line); });
   auto vocabulary = OpenVocabulary(flags.input);
   const std::filesystem::path directory = PrepareRunDirectory(flags.input.out);
-  RefineGuess(flags.input, flags.common, options, interruption, progress, input);
+  RefineGuess(options, interruption, progress, input);
   const double guess_s = SecondsSince(start);
   Checkpoint checkpoint(directory,
                         flags.checkpoint,
                         IdentityOf("run", input, flags.input, options, flags.common.seed),
                         progress);
-  if (input.guess) FreeFocal(options.ba.lens);
-  const Orientations orientations = FindOrientations(input,
-                                                     options,
-                                                     std::move(vocabulary),
-                                                     true,
-                                                     flags.common,
-                                                     interruption,
-                                                     progress,
-                                                     &checkpoint);
+  if (input.guess) FreeFocalLength(options.ba.lens);
+  SlamProgress observer(options, interruption, progress);
+  const Orientations orientations =
+      TrackInput(options, std::move(vocabulary), true, observer, checkpoint, input);
   const UnfinishedOutputs outputs(directory);
   WriteOrientations(outputs.folder(), orientations);
   const double orientations_s = SecondsSince(start) - guess_s;
@@ -85,9 +82,9 @@ int Run(const RunFlags& flags) {
     return Interruption::kExitCode;
   }
 
-  const PositionResult positions = [&] {
+  const MapResult positions = [&] {
     const LastWords last_words(interruption, end_early);
-    return FindPositions(input, orientations, options, flags.common.NumThreads(), progress);
+    return BuildMap(orientations, options, input.frames.get(), observer);
   }();
   const double positions_s = SecondsSince(start) - orientations_s - guess_s;
   WritePositions(outputs.folder(),
@@ -96,13 +93,13 @@ int Run(const RunFlags& flags) {
                  positions.camera,
                  flags.ascii ? PlyForm::kAscii : PlyForm::kBinary);
   WriteKnownRotationInput(outputs.folder(), orientations, positions, input.camera);
-  WriteMaps(outputs.folder(), *input.sequence, orientations, positions, options.rotodom.features);
+  WriteMaps(outputs.folder(), input.sequence(), orientations, positions, options.rotodom.features);
 
   RunSummary summary = StartSummary("run", input, orientations, DescribeOptions(options));
   AddPositions(positions, input.camera, summary);
   const bool rotates_by_lens = positions.is_held_throughout && positions.camera != input.camera;
   if (rotates_by_lens) {
-    summary.calibration = {{"source", "turning"},
+    summary.calibration = {{"source", "pure_rotation"},
                            {"given_px", input.camera.MeanFocal()},
                            {"refined_px", positions.camera.MeanFocal()}};
   }

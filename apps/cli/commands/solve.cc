@@ -13,11 +13,11 @@
 #include <vector>
 
 #include "apps/cli/command.h"
-#include "apps/cli/input/config.h"
-#include "apps/cli/input/pipeline.h"
+#include "apps/cli/input/run_options.h"
 #include "apps/cli/run_directory/run_directory.h"
+#include "apps/cli/terminal/describe.h"
 #include "apps/cli/terminal/progress.h"
-#include "apps/slam/refinement.h"
+#include "apps/slam/map/refinement.h"
 #include "output/export/known_rotation_file.h"
 #include "output/files/atomic_file.h"
 #include "output/graph/rotation_list.h"
@@ -156,7 +156,7 @@ void WriteComponents(const std::filesystem::path& directory,
 }
 
 RunSummary Summarise(const SolveFlags& flags,
-                     const PipelineOptions& options,
+                     const RunOptions& options,
                      const KnownRotationInput& input,
                      const KrotSolution& krot,
                      const RefinedComponents& refined) {
@@ -190,11 +190,9 @@ RunSummary Summarise(const SolveFlags& flags,
 int Solve(const SolveFlags& flags) {
   const Clock::time_point start = Clock::now();
   Progress progress(flags.common);
-  PipelineOptions options;
-  if (!flags.common.config.empty()) LoadOptionsYaml(flags.common.config, options);
+  RunOptions options = ReadRunOptions(flags.common);
   flags.krot.Override(options.krot);
-  options.krot.seed = flags.common.seed;
-  options.krot.num_threads = options.ba.num_threads = flags.common.NumThreads();
+  options.krot.num_threads = options.ba.num_threads = options.num_threads;
 
   progress.StartStage("reading", -1);
   KnownRotationInput input = ReadKnownRotation(flags.input);

@@ -4,7 +4,8 @@
 #include <stdexcept>
 
 #include "apps/cli/input/input_lines.h"
-#include "apps/slam/focal_guess.h"
+#include "apps/slam/focal_length.h"
+#include "output/trajectory/orientation_file.h"
 #include "rotodom/camera/camera_form.h"
 #include "rotodom/camera/read_camera.h"
 #include "rotodom/loop/vocabulary_file.h"
@@ -60,7 +61,7 @@ std::shared_ptr<const Vocabulary> OpenVocabulary(const InputFlags& flags) {
 }
 
 void ReadCalibration(const InputFlags& flags, Input& input) {
-  const Sequence& sequence = *input.sequence;
+  const Sequence& sequence = input.sequence();
   const cv::Size size = sequence.image_size();
   Camera camera;
   if (!flags.camera.empty() || sequence.camera_reference()) {
@@ -96,24 +97,23 @@ Input OpenInput(const InputFlags& flags,
                 const std::function<void(const std::string&)>& tell) {
   Input input;
   input.path = std::filesystem::absolute(flags.sequence).lexically_normal().string();
-  input.sequence = OpenSequence(flags.sequence, options);
-  for (const std::string& line : DescribeSequence(*input.sequence)) tell(line);
+  input.frames = std::make_unique<SequenceSource>(flags.sequence, options);
+  for (const std::string& line : DescribeSequence(input.sequence())) tell(line);
   if (flags.focal_guess) {
-    const cv::Size size = input.sequence->image_size();
+    const cv::Size size = input.sequence().image_size();
     input.guess = GuessFocal(flags.sequence, options, size);
-    input.camera = CameraOf(*input.guess, size);
+    input.camera = UncalibratedCamera(size, input.guess->focal_px);
   } else {
     ReadCalibration(flags, input);
   }
   if (!flags.rotations.empty()) {
     OrientationFile file = ReadOrientationFile(flags.rotations);
     for (const std::string& note : file.notes) tell("note:   " + flags.rotations + ": " + note);
-    input.given_rotations = std::move(file.orientations);
-    input.rotations_file = flags.rotations;
+    input.given_rotations = {flags.rotations, std::move(file.orientations)};
   }
   for (const std::string& line : DescribeCamera(input)) tell(line);
-  if (input.sequence->NumFrames() >= 0 && input.sequence->NumFrames() < 3) {
-    throw std::runtime_error(flags.sequence + ": " + std::to_string(input.sequence->NumFrames()) +
+  if (input.sequence().NumFrames() >= 0 && input.sequence().NumFrames() < 3) {
+    throw std::runtime_error(flags.sequence + ": " + std::to_string(input.sequence().NumFrames()) +
                              " frames after --first, --last and --stride; at least 3 are needed");
   }
   return input;

@@ -1,12 +1,15 @@
 #pragma once
 
+#include <functional>
 #include <memory>
 #include <optional>
 #include <string>
 #include <vector>
 
 #include "apps/cli/command.h"
-#include "output/trajectory/orientation_file.h"
+#include "apps/cli/input/focal_guess.h"
+#include "apps/slam/frame_source.h"
+#include "apps/slam/given_rotations.h"
 #include "rotodom/camera/camera.h"
 #include "rotodom/loop/loop_closure.h"
 #include "rotodom/rolling_shutter/readout.h"
@@ -35,16 +38,10 @@ struct InputFlags {
 
 void AddInputFlags(CLI::App& command, InputFlags& flags);
 
-/// A focal length that no calibration gives.
-struct FocalGuess {
-  std::string source;     // "focal_guess_exif" or "focal_guess_width"
-  double guess_px = 0.0;  // at first
-  double focal_px = 0.0;  // what is worked with
-};
-
+/// What a run works on.
 struct Input {
   std::string path;  // of the sequence, absolute
-  std::unique_ptr<Sequence> sequence;
+  std::unique_ptr<SequenceSource> frames;
   Camera camera;  // with the size of the images
   std::string camera_file;
   std::string camera_source;              // for people: the file, the camera in it, its form
@@ -52,9 +49,9 @@ struct Input {
   std::optional<FocalGuess> guess;        // set: there is no camera_file
   // How its sensor is read out, where the images tell it instead of the calibration.
   std::optional<ReadoutEstimate> readout;
-  // Orientations from elsewhere, and their file.
-  std::optional<std::vector<StampedRotation>> given_rotations;
-  std::string rotations_file;
+  std::optional<OrientationsFromElsewhere> given_rotations;
+
+  const Sequence& sequence() const { return frames->sequence(); }
 };
 
 /// The vocabulary that --vocabulary names; null when it names none. Throws std::runtime_error with

@@ -63,7 +63,7 @@ std::vector<std::string> DescribeCamera(const Input& input) {
                                     (input.guess ? "guessed" : input.camera_source) + ")"};
   for (const std::string& note : input.camera_notes) lines.push_back("note:   " + note);
   // A calibration that names no side means the top, which a phone held upright has elsewhere.
-  const auto& side = input.sequence->readout_from();
+  const auto& side = input.sequence().readout_from();
   const Camera& camera = input.camera;
   if (side && *side != ReadoutStart::kTop && camera.readout_s > 0.0 &&
       camera.readout_from != *side) {

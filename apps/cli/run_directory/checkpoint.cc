@@ -124,12 +124,12 @@ void AddCheckpointFlags(CLI::App& command, CheckpointFlags& flags) {
 RunIdentity IdentityOf(const std::string& command,
                        const Input& input,
                        const InputFlags& flags,
-                       const PipelineOptions& options,
+                       const RunOptions& options,
                        std::uint64_t seed) {
   RunIdentity identity = {
       {"rotslam", Version() + " (" + ChecksumOf(VersionText()) + ")"},
       {"the command", command},
-      {"the sequence", DescribeImages(*input.sequence)},
+      {"the sequence", DescribeImages(input.sequence())},
       {"the camera", DescribeCamera(input.camera)},
       {"the vocabulary", DescribeVocabulary(flags.vocabulary)},
       {"the seed", std::to_string(seed)},

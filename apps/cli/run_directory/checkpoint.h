@@ -10,11 +10,10 @@
 
 #include "apps/cli/command.h"
 #include "apps/cli/input/input.h"
-#include "apps/cli/input/pipeline.h"
+#include "apps/cli/input/run_options.h"
 #include "apps/cli/terminal/progress.h"
+#include "apps/slam/frame_log.h"
 #include "output/files/journal.h"
-#include "rotodom/loop/frame_record.h"
-#include "rotodom/loop/looped_odometry.h"
 
 namespace rotslam {
 
@@ -33,20 +32,8 @@ using RunIdentity = std::vector<std::pair<std::string, std::string>>;
 RunIdentity IdentityOf(const std::string& command,
                        const Input& input,
                        const InputFlags& flags,
-                       const PipelineOptions& options,
+                       const RunOptions& options,
                        std::uint64_t seed);
-
-/// One frame as it was found, without its image.
-struct RecordedFrame {
-  Frame frame;
-  FrameRecord record;
-  SeenPoints points;  // empty where nobody needs them any more
-
-  template <class Archive>
-  void Transfer(Archive& archive) {
-    archive(frame.id, frame.timestamp_s, frame.name, frame.problem, record, points);
-  }
-};
 
 /// What a run needs to go on after it was killed: two files in UnfinishedFolder(), which is there
 /// from the first checkpoint until Remove().
@@ -54,7 +41,7 @@ struct RecordedFrame {
 ///   state.bin   the run's identity, which part of the journal counts, and the odometry's state
 ///               after it; replaced as a whole, so that one that can be used is always there
 /// When the disk refuses, the run goes on without checkpoints; the last one stays.
-class Checkpoint {
+class Checkpoint : public FrameLog {
  public:
   /// With flags.resume, opens what an interrupted run has left, or says that there is nothing;
   /// throws std::runtime_error when that is damaged or of another run.
@@ -63,26 +50,18 @@ class Checkpoint {
              RunIdentity identity,
              Progress& progress);
   /// Leaves no folder without a checkpoint in it.
-  ~Checkpoint();
+  ~Checkpoint() override;
   Checkpoint(const Checkpoint&) = delete;
   Checkpoint& operator=(const Checkpoint&) = delete;
 
-  /// The frames of the interrupted run, one by one; nullopt after the last. Throws
-  /// std::runtime_error when the journal is damaged.
-  std::optional<RecordedFrame> NextRecorded();
-  /// Gives the odometry the state that it had after them.
-  void Restore(LoopedOdometry& odometry) const;
-
-  /// What the frames have told of the camera's readout before they were read once more with it.
-  const std::optional<ReadoutEstimate>& readout() const { return readout_; }
-  /// Forgets all frames: they are read once more.
-  void StartOver(const ReadoutEstimate& readout);
-
-  bool IsOn() const { return writer_ != nullptr; }
-  void Append(RecordedFrame& frame);
-  bool IsDue() const;
-  /// @param state  the odometry's, after the frame appended last.
-  void Commit(std::string state);
+  std::optional<RecordedFrame> NextRecorded() override;
+  void Restore(LoopedOdometry& odometry) const override;
+  const std::optional<ReadoutEstimate>& readout() const override { return readout_; }
+  void StartOver(const ReadoutEstimate& readout) override;
+  bool IsOn() const override { return writer_ != nullptr; }
+  void Append(RecordedFrame& frame) override;
+  bool IsDue() const override;
+  void Commit(std::string state) override;
 
   /// The run is complete.
   void Remove();

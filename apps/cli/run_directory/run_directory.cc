@@ -11,9 +11,8 @@
 
 #include <unistd.h>
 
+#include "apps/cli/input/focal_guess.h"
 #include "apps/cli/run_directory/unfinished.h"
-#include "apps/slam/focal_guess.h"
-#include "apps/slam/readout_decision.h"
 #include "output/export/known_rotation_file.h"
 #include "output/files/atomic_file.h"
 #include "output/graph/g2o.h"
@@ -28,6 +27,85 @@
 
 namespace rotslam {
 namespace {
+
+// Camera->world poses from orientations alone, positions zero.
+Trajectory RotationTrajectory(const Orientations& orientations) {
+  Trajectory trajectory;
+  for (const auto& [frame, cam_from_world] : orientations.cam_from_world) {
+    trajectory.push_back({orientations.timestamps_s[frame.value],
+                          cam_from_world.Inverse(),
+                          Eigen::Vector3d::Zero()});
+  }
+  return trajectory;
+}
+
+// Camera->world poses of all frames of `centers`.
+Trajectory MakeTrajectory(const std::vector<double>& timestamps_s,
+                          const RotationMap& cam_from_world,
+                          const CenterMap& centers) {
+  Trajectory trajectory;
+  for (const auto& [frame, center] : centers) {
+    trajectory.push_back({timestamps_s[frame.value], cam_from_world.at(frame).Inverse(), center});
+  }
+  return trajectory;
+}
+
+// The lines of rotations.csv, see docs/formats.md.
+std::vector<RotationRow> RotationRows(const Orientations& orientations) {
+  std::vector<RotationRow> rows;
+  rows.reserve(orientations.cam_from_world.size());
+  for (const auto& [frame, cam_from_world] : orientations.cam_from_world) {
+    RotationRow& row = rows.emplace_back();
+    row.frame = frame.value;
+    row.timestamp_s = orientations.timestamps_s[frame.value];
+    row.world_from_cam = cam_from_world.Inverse();
+    row.inlier_edges = orientations.inlier_edges.at(frame);
+    if (const auto known = orientations.covariance.find(frame);
+        known != orientations.covariance.end()) {
+      row.sigma_deg = known->second.diagonal().cwiseSqrt() * kDegFromRad;
+    }
+    const FrameReport& report = orientations.reports[frame.value];
+    if (orientations.given) {
+      row.flags.emplace_back("given");
+    } else if (orientations.graph.EdgesOf(frame).empty()) {
+      row.flags.emplace_back("predicted");
+    }
+    if (report.weak) row.flags.emplace_back("weak");
+    if (report.searched_wide) row.flags.emplace_back("searched_wide");
+    if (std::binary_search(orientations.breaks.begin(), orientations.breaks.end(), frame)) {
+      row.flags.emplace_back("break");
+    }
+    const auto closes_loop = [f = frame](const LoopCheck& check) {
+      return check.accepted && check.frame == f;
+    };
+    if (std::any_of(orientations.loops.begin(), orientations.loops.end(), closes_loop)) {
+      row.flags.emplace_back("loop");
+    }
+  }
+  return rows;
+}
+
+// The lines of loops.csv.
+std::vector<LoopRow> LoopRows(const Orientations& orientations) {
+  std::vector<LoopRow> rows;
+  rows.reserve(orientations.loops.size());
+  for (const LoopCheck& check : orientations.loops) {
+    rows.push_back({check.frame.value,
+                    check.match.value,
+                    check.score,
+                    check.num_inliers,
+                    check.angle_deg,
+                    check.accepted,
+                    check.way.turn_scale,
+                    check.way.angle_deg,
+                    check.num_edges});
+  }
+  return rows;
+}
+
+SummaryTable SummaryOf(const ReadoutEstimate& readout) {
+  return {{"source", "images"}, {"readout_s", readout.readout_s}, {"sigma_s", readout.sigma_s}};
+}
 
 // The component that a frame's position belongs to: that of the keyframe at or before it.
 int ComponentAt(const std::vector<MapComponent>& components, int frame) {
@@ -46,7 +124,7 @@ struct FrameMotion {
   bool operator==(const FrameMotion& other) const = default;
 };
 
-std::vector<FrameMotion> MotionOfFrames(const PositionResult& positions) {
+std::vector<FrameMotion> MotionOfFrames(const MapResult& positions) {
   std::vector<FrameMotion> motions(positions.cam_from_world.size());
   for (int k = 0; k < std::ssize(positions.held); ++k) {
     const PureRotationSegment& stretch = positions.held[k];
@@ -60,7 +138,7 @@ std::vector<FrameMotion> MotionOfFrames(const PositionResult& positions) {
 
 // How the scale of a segment's component is known. Behind a segment that only turns the same
 // component goes on where its tracks, or a loop, reach across.
-std::string ScaleOf(const PositionResult& positions, int component, int first_frame) {
+std::string ScaleOf(const MapResult& positions, int component, int first_frame) {
   if (component < 0) return "none";
   const MapComponent& part = positions.components[component];
   if (part.placed_by_default) return "continuity";
@@ -75,7 +153,7 @@ std::string ScaleOf(const PositionResult& positions, int component, int first_fr
 
 // Cut where the kind of motion changes and, outside of pure-rotation segments, where a component of
 // the map begins.
-std::vector<Segment> Segments(const PositionResult& positions) {
+std::vector<Segment> Segments(const MapResult& positions) {
   const std::vector<FrameMotion> motions = MotionOfFrames(positions);
   std::set<int> component_starts;
   for (const MapComponent& component : positions.components) {
@@ -228,7 +306,7 @@ void WriteOrientations(const std::filesystem::path& directory, const Orientation
 
 void WritePositions(const std::filesystem::path& directory,
                     const Orientations& orientations,
-                    const PositionResult& positions,
+                    const MapResult& positions,
                     const Camera& camera,
                     PlyForm form) {
   const Trajectory trajectory = MakeTrajectory(
@@ -264,7 +342,7 @@ void WritePositions(const std::filesystem::path& directory,
 
 void WriteKnownRotationInput(const std::filesystem::path& directory,
                              const Orientations& orientations,
-                             const PositionResult& positions,
+                             const MapResult& positions,
                              const Camera& camera) {
   KnownRotationInput input;
   input.camera = camera;
@@ -280,7 +358,7 @@ void WriteKnownRotationInput(const std::filesystem::path& directory,
 void WriteMaps(const std::filesystem::path& directory,
                const Sequence& sequence,
                const Orientations& orientations,
-               const PositionResult& positions,
+               const MapResult& positions,
                const FeatureOptions& features) {
   RunMap map;
   map.level_scale = features.scale_factor;
@@ -330,7 +408,7 @@ RunSummary StartSummary(const std::string& command,
   if (input.guess) summary.calibration = SummaryOf(*input.guess, input.camera);
   if (input.readout) summary.readout = SummaryOf(*input.readout);
   const auto count = [](std::size_t value) { return static_cast<std::int64_t>(value); };
-  summary.sequence = {{"description", input.sequence->Describe()},
+  summary.sequence = {{"description", input.sequence().Describe()},
                       {"path", input.path},
                       {"camera_file", input.camera_file},
                       {"first_timestamp_s", orientations.timestamps_s.front()},
@@ -381,7 +459,7 @@ RunSummary StartSummary(const std::string& command,
   return summary;
 }
 
-void AddPositions(const PositionResult& positions, const Camera& camera, RunSummary& summary) {
+void AddPositions(const MapResult& positions, const Camera& camera, RunSummary& summary) {
   const auto count = [](std::size_t value) { return static_cast<std::int64_t>(value); };
   summary.counts.push_back({"keyframes", count(positions.keyframes.size())});
   summary.counts.push_back({"map_points", count(positions.map.point_in_world.size())});

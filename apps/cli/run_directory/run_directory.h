@@ -4,9 +4,10 @@
 #include <string>
 #include <vector>
 
+#include "apps/cli/input/input.h"
 #include "apps/cli/run_directory/checkpoint.h"
+#include "apps/slam/build_map.h"
 #include "apps/slam/orientations.h"
-#include "apps/slam/positions.h"
 #include "output/map/ply.h"
 #include "output/tables/summary.h"
 
@@ -24,14 +25,14 @@ void WriteOrientations(const std::filesystem::path& directory, const Orientation
 /// segments.csv.
 void WritePositions(const std::filesystem::path& directory,
                     const Orientations& orientations,
-                    const PositionResult& positions,
+                    const MapResult& positions,
                     const Camera& camera,
                     PlyForm form);
 
 /// known_rotation.txt: the keyframes' orientations and tracks, which `rotslam solve` reads.
 void WriteKnownRotationInput(const std::filesystem::path& directory,
                              const Orientations& orientations,
-                             const PositionResult& positions,
+                             const MapResult& positions,
                              const Camera& camera);
 
 /// map.bin, the keyframes' map with all their tracks, and map_all_frames.bin, the cloud as all
@@ -40,7 +41,7 @@ void WriteKnownRotationInput(const std::filesystem::path& directory,
 void WriteMaps(const std::filesystem::path& directory,
                const Sequence& sequence,
                const Orientations& orientations,
-               const PositionResult& positions,
+               const MapResult& positions,
                const FeatureOptions& features);
 
 /// What the terminal says of a run that Ctrl-C has ended: what WriteOrientations has left.
@@ -55,7 +56,7 @@ RunSummary StartSummary(const std::string& command,
                         std::vector<OptionEntry> options);
 
 /// The parts that only `run` has.
-void AddPositions(const PositionResult& positions, const Camera& camera, RunSummary& summary);
+void AddPositions(const MapResult& positions, const Camera& camera, RunSummary& summary);
 
 /// The parts that `run` and `solve` share.
 void AddKnownRotation(const KrotSolution& solution, const Camera& camera, RunSummary& summary);

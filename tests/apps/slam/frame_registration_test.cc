@@ -19,7 +19,7 @@ bool IsKeyframe(FrameId frame) { return frame.value % kKeyframeEvery == 0; }
 struct Street {
   Scene scene;
   Orientations orientations;
-  PositionResult result;
+  MapResult result;
 
   explicit Street(int num_points) {
     SceneOptions options;
@@ -54,7 +54,7 @@ struct Street {
     }
   }
 
-  void Place() { RegisterFrames(orientations, scene.tracks, PipelineOptions(), 1, result); }
+  void Place() { RegisterFrames(orientations, scene.tracks, SlamOptions(), result); }
 
   // Root mean square over the frames between keyframes.
   double AngleErrorDeg() const {

@@ -35,8 +35,9 @@ class MapViewsTest : public testing::Test {
                 const SequenceOptions& options,
                 const std::set<FrameId>& frames) {
     problems_.clear();
+    SequenceSource images(path, options);
     return ReadMapViews(
-        path, options, frames, [&](const std::string& problem) { problems_.push_back(problem); });
+        images, frames, [&](const std::string& problem) { problems_.push_back(problem); });
   }
 
   const TemporaryFolder folder_;

@@ -9,6 +9,11 @@ namespace {
 
 constexpr double kReadoutS = 0.02;
 
+SlamOptions TwoThreads(SlamOptions options) {
+  options.num_threads = 2;
+  return options;
+}
+
 Rotation TurnSteadily(double time_s) { return Rotation::Exp({0.0, 0.3 * time_s - 0.6, 0.0}); }
 
 OdometryResult ResultOf(const RollingFootage& footage) {
@@ -26,7 +31,7 @@ void Show(const RollingFootage& footage, ReadoutDecision& watch) {
 
 TEST(ReadoutDecision, LooksAfter120Frames) {
   const RollingFootage footage = FilmRolling(Swing, Stay, kReadoutS, ReadoutStart::kTop, 120);
-  ReadoutDecision watch(footage.camera, {}, 2);
+  ReadoutDecision watch(footage.camera, TwoThreads({}));
   EXPECT_TRUE(watch.IsOn());
   Show(footage, watch);
   ASSERT_TRUE(watch.found().has_value());
@@ -36,7 +41,7 @@ TEST(ReadoutDecision, LooksAfter120Frames) {
 
 TEST(ReadoutDecision, LooksAtTheEndOfAShorterSequence) {
   const RollingFootage footage = FilmRolling(Swing, Stay, kReadoutS, ReadoutStart::kBottom, 60);
-  ReadoutDecision watch(footage.camera, {}, 2);
+  ReadoutDecision watch(footage.camera, TwoThreads({}));
   Show(footage, watch);
   EXPECT_FALSE(watch.found().has_value());
   EXPECT_TRUE(watch.IsOn());
@@ -47,7 +52,7 @@ TEST(ReadoutDecision, LooksAtTheEndOfAShorterSequence) {
 
 TEST(ReadoutDecision, IsDoneWithAGlobalShutter) {
   const RollingFootage footage = FilmRolling(Swing, Stay, 0.0, ReadoutStart::kTop, 120);
-  ReadoutDecision watch(footage.camera, {}, 2);
+  ReadoutDecision watch(footage.camera, TwoThreads({}));
   Show(footage, watch);
   EXPECT_FALSE(watch.found().has_value());
   EXPECT_FALSE(watch.IsOn());
@@ -55,13 +60,13 @@ TEST(ReadoutDecision, IsDoneWithAGlobalShutter) {
 
 TEST(ReadoutDecision, GivesUpAfterSoManyFrames) {
   const RollingFootage footage = FilmRolling(TurnSteadily, Stay, 0.0, ReadoutStart::kTop, 60);
-  PipelineOptions options;
+  SlamOptions options;
   options.readout.max_frames = 61;
-  ReadoutDecision patient(footage.camera, options, 2);
+  ReadoutDecision patient(footage.camera, TwoThreads(options));
   Show(footage, patient);
   EXPECT_TRUE(patient.IsOn());
   options.readout.max_frames = 60;
-  ReadoutDecision impatient(footage.camera, options, 2);
+  ReadoutDecision impatient(footage.camera, TwoThreads(options));
   Show(footage, impatient);
   EXPECT_FALSE(impatient.IsOn());
 }
@@ -70,7 +75,7 @@ TEST(ReadoutDecision, AsksNothingThatIsKnownOrNotWanted) {
   const RollingFootage footage = FilmRolling(Swing, Stay, kReadoutS, ReadoutStart::kTop, 60);
   Camera camera = footage.camera;
   camera.knows_readout = true;
-  PipelineOptions unwanted;
+  SlamOptions unwanted;
   unwanted.readout.enabled = false;
   for (ReadoutDecision watch :
        {ReadoutDecision(camera, {}, 2), ReadoutDecision(footage.camera, unwanted, 2)}) {

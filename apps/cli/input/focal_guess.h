@@ -1,0 +1,35 @@
+#pragma once
+
+#include <filesystem>
+#include <optional>
+#include <string>
+
+#include <opencv2/core.hpp>
+
+#include "output/tables/summary.h"
+#include "rotodom/camera/camera.h"
+#include "rotodom/sequence/sequence.h"
+
+namespace rotslam {
+
+/// A focal length that no calibration gives.
+struct FocalGuess {
+  std::string source;     // "focal_guess_exif" or "focal_guess_width"
+  double guess_px = 0.0;  // at first
+  double focal_px = 0.0;  // what is worked with
+};
+
+/// The focal length as if a film camera had taken the image, mm, from the EXIF data of a JPEG file;
+/// nullopt where it does not say.
+std::optional<double> FilmFocalLength(const std::filesystem::path& image);
+
+/// What the first image's EXIF data say, else GuessFocalLength.
+FocalGuess GuessFocal(const std::filesystem::path& sequence,
+                      const SequenceOptions& options,
+                      const cv::Size& image_size);
+
+/// What to tell the user, and the part of summary.json.
+std::string WarningOf(const FocalGuess& guess, const Camera& refined);
+SummaryTable SummaryOf(const FocalGuess& guess, const Camera& refined);
+
+}  // namespace rotslam

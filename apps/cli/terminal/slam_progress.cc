@@ -1,0 +1,275 @@
+#include "apps/cli/terminal/slam_progress.h"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <cstdio>
+#include <vector>
+
+#include "apps/cli/terminal/describe.h"
+#include "apps/slam/map_result.h"
+#include "apps/slam/orientations.h"
+
+namespace rotslam {
+
+// What runs past while the sequence is read.
+class SlamProgress::Counters {
+ public:
+  explicit Counters(const PureRotationOptions& options) : options_(options) {}
+
+  std::vector<std::string> Update(const LoopedEstimate& estimate, const OdometryResult& result) {
+    num_loops_ += std::count_if(estimate.loops.begin(),
+                                estimate.loops.end(),
+                                [](const LoopCheck& check) { return check.accepted; });
+    // A look takes time in proportion to what has been read: rarer and rarer, so that all of them
+    // together do, too.
+    constexpr int kFramesBetweenLooks = 30;
+    if (estimate.frame.value >= next_look_) {
+      num_segments_ = CountSegments(result);
+      next_look_ = estimate.frame.value + std::max(kFramesBetweenLooks, estimate.frame.value / 10);
+    }
+    return {std::to_string(estimate.report.num_inliers) + " inliers",
+            Counted(num_loops_, "loop"),
+            Counted(num_segments_, "segment")};
+  }
+
+ private:
+  static std::string Counted(std::int64_t count, const std::string& what) {
+    return std::to_string(count) + " " + what + (count == 1 ? "" : "s");
+  }
+
+  // Stretches on which the camera moves, or does not.
+  std::int64_t CountSegments(const OdometryResult& result) const {
+    const RotationMap& cam_from_world = result.cam_from_world;
+    std::int64_t count = 0;
+    int next = cam_from_world.begin()->first.value;
+    for (const PureRotationSegment& stretch :
+         FindPureRotationSegments(result.graph, cam_from_world, options_)) {
+      count += stretch.first.value > next ? 2 : 1;
+      next = stretch.last.value + 1;
+    }
+    return count + (cam_from_world.rbegin()->first.value >= next ? 1 : 0);
+  }
+
+  PureRotationOptions options_;
+  std::int64_t num_loops_ = 0;
+  std::int64_t num_segments_ = 1;
+  int next_look_ = 29;
+};
+
+namespace {
+
+const char* NameOf(SlamStage stage) {
+  switch (stage) {
+    case SlamStage::kOrientations:
+      return "orientations";
+    case SlamStage::kTracks:
+      return "tracks";
+    case SlamStage::kKnownRotation:
+      return "known rotation";
+    case SlamStage::kBundleAdjustment:
+      return "bundle adjustment";
+    case SlamStage::kPureRotation:
+      return "pure rotation";
+    case SlamStage::kFrameRegistration:
+      return "frames between keyframes";
+    case SlamStage::kCloud:
+      return "cloud";
+  }
+  return "";
+}
+
+// What a copy has cut off is missed by nobody; the odd frame is a container's own miscount.
+void WarnOfMissingFrames(int num_frames, int num_announced, Progress& progress) {
+  const int num_missing = num_announced - num_frames;
+  if (num_missing <= std::max(2, num_announced / 100)) return;
+  progress.Warn("the video ends after " + std::to_string(num_frames) + " of the " +
+                std::to_string(num_announced) + " frames it announces; is the file complete?");
+}
+
+void TellDetails(const LoopedEstimate& estimate, Progress& progress) {
+  const FrameReport& report = estimate.report;
+  progress.Detail("frame " + std::to_string(estimate.frame.value) + ": " +
+                  std::to_string(report.num_tracked) + " points tracked, " +
+                  std::to_string(report.num_inliers) + " inliers" +
+                  (report.predicted_only ? ", no edge" : "") + (report.weak ? ", weak" : "") +
+                  (report.searched_wide ? ", searched wide" : "") +
+                  (estimate.has_averaged ? ", drift spread over all orientations" : ""));
+  for (const LoopCheck& check : estimate.loops) {
+    progress.Detail("frame " + std::to_string(check.frame.value) + " looks like frame " +
+                    std::to_string(check.match.value) + ": " + std::to_string(check.num_inliers) +
+                    " inliers, " + std::to_string(check.angle_deg) + " deg around the loop, " +
+                    (check.accepted ? "accepted, " + std::to_string(check.num_edges) + " edges"
+                                    : std::string("not accepted")));
+  }
+}
+
+// Loops right round measure the scale of all rotations.
+void WarnOfRotationScale(const std::vector<LoopCheck>& loops, Progress& progress) {
+  constexpr double kNotable = 0.02;
+  const RotationScale scale = RotationScaleOf(loops);
+  if (std::abs(scale.factor - 1.0) < kNotable) return;
+  const bool is_small = scale.factor > 1.0;
+  std::array<char, 160> text = {};
+  std::snprintf(text.data(),
+                text.size(),
+                "turns around %d closed loops come out %.1f %% too %s: check the focal length, "
+                "which seems too %s",
+                scale.num_loops,
+                100.0 * std::abs(scale.factor - 1.0),
+                is_small ? "small" : "large",
+                is_small ? "long" : "short");
+  progress.Warn(text.data());
+}
+
+void WarnOfInterpolatedFrames(const Orientations& orientations, Progress& progress) {
+  // The unreadable ones have had their warning.
+  const int count = static_cast<int>(orientations.unconnected.size()) - orientations.num_unreadable;
+  if (count <= 0) return;
+  progress.Warn(std::to_string(count) +
+                (count == 1 ? " frame matches no other; its orientation is interpolated"
+                            : " frames match no other; their orientations are interpolated"));
+}
+
+void WarnOfBreaks(const std::vector<FrameId>& breaks, Progress& progress) {
+  for (const FrameId frame : breaks) {
+    progress.Warn("frame " + std::to_string(frame.value) +
+                  " matches none before it; the turn across this gap is extrapolated");
+  }
+}
+
+void TellRelocalised(const std::set<FrameId>& frames, Progress& progress) {
+  constexpr std::size_t kMaxNamed = 12;
+  if (frames.empty()) return;
+  std::string names;
+  std::size_t count = 0;
+  for (const FrameId frame : frames) {
+    if (count++ < kMaxNamed) names += " " + std::to_string(frame.value);
+  }
+  if (count > kMaxNamed) names += " and " + std::to_string(count - kMaxNamed) + " more";
+  progress.Say("keyframes found again in another place of the map:" + names);
+}
+
+void TellCloud(const MapResult& result, double min_angle_deg, Progress& progress) {
+  const int num_points = static_cast<int>(result.cloud.point_in_world.size());
+  std::array<char, 160> text = {};
+  std::snprintf(text.data(),
+                text.size(),
+                "%d points; %d seen under less than %g deg and %d that stood alone left out",
+                num_points,
+                result.num_shallow_points,
+                min_angle_deg,
+                result.num_cloud_outliers);
+  progress.EndStage(text.data());
+  const int num_all = num_points + result.num_shallow_points + result.num_cloud_outliers;
+  if (num_points > 0 && 2 * num_points >= num_all) return;
+  progress.Warn("the cloud holds " + std::to_string(num_points) + " of " + std::to_string(num_all) +
+                " points: the camera has moved too little for more");
+}
+
+std::string DescribeKeyframes(const MapResult& map) {
+  return std::to_string(map.keyframes.size()) + " keyframes, " +
+         std::to_string(map.keyframe_tracks.size()) + " tracks, " +
+         std::to_string(map.held.size()) + " pure-rotation segment" +
+         (map.held.size() == 1 ? "" : "s");
+}
+
+}  // namespace
+
+SlamProgress::SlamProgress(const SlamOptions& options,
+                           const Interruption& interruption,
+                           Progress& progress)
+    : options_(options), interruption_(interruption), progress_(progress) {}
+
+SlamProgress::~SlamProgress() = default;
+
+void SlamProgress::OnBegin(SlamStage stage, int num_steps) {
+  if (stage == SlamStage::kOrientations) {
+    num_announced_ = num_steps;
+    counters_ = std::make_unique<Counters>(options_.pure_rotation_segments);
+  }
+  progress_.StartStage(NameOf(stage), num_steps);
+}
+
+void SlamProgress::OnFrame(const FrameProgress& progress) {
+  const Frame& frame = progress.frame;
+  if (!frame.problem.empty()) {
+    progress_.Warn("frame " + std::to_string(frame.id.value) +
+                   " skipped, its pose is interpolated: " + frame.problem);
+  }
+  TellDetails(progress.estimate, progress_);
+  progress_.Step(frame.id.value + 1, counters_->Update(progress.estimate, progress.odometry));
+}
+
+void SlamProgress::OnReadoutFound(const ReadoutEstimate& readout) {
+  progress_.EndStage("the shutter rolls, read out in " + DescribeReadout(readout));
+  progress_.Warn(
+      "how the sensor is read out is not known, the images tell it: starts again from the first "
+      "frame with " +
+      CameraLines(readout) + "; in the camera file that spares the second reading");
+}
+
+void SlamProgress::OnMissingImage(const std::string& problem) {
+  progress_.Warn(problem + "; points are not looked for in images that cannot be read again");
+}
+
+void SlamProgress::OnFocalPass(int pass, double focal_px) {
+  std::array<char, 32> focal = {};
+  std::snprintf(focal.data(), focal.size(), "%.1f px", focal_px);
+  progress_.Say("pass " + std::to_string(pass) +
+                " over the beginning, for the focal length: from " + focal.data() +
+                (pass == 1 ? ", a guess" : ""));
+}
+
+void SlamProgress::OnEnd(SlamStage /*stage*/, const Orientations& orientations) {
+  const int num_frames = static_cast<int>(orientations.timestamps_s.size());
+  if (!orientations.interrupted) WarnOfMissingFrames(num_frames, num_announced_, progress_);
+  progress_.EndStage(std::to_string(num_frames) + " frames, " +
+                     std::to_string(orientations.graph.edges().size()) + " edges");
+  if (orientations.given) {
+    progress_.Say("orientations from " + orientations.given->file + ", " +
+                  std::to_string(orientations.given->disagreement_deg) +
+                  " deg from the edges (median)");
+  } else {
+    WarnOfInterpolatedFrames(orientations, progress_);
+  }
+  WarnOfRotationScale(orientations.loops, progress_);
+  WarnOfBreaks(orientations.breaks, progress_);
+}
+
+void SlamProgress::OnEnd(SlamStage stage, const MapResult& map) {
+  switch (stage) {
+    case SlamStage::kTracks:
+      progress_.EndStage(DescribeKeyframes(map));
+      break;
+    case SlamStage::kKnownRotation:
+      progress_.EndStage(map.krot.message);
+      break;
+    case SlamStage::kBundleAdjustment:
+      progress_.EndStage(std::to_string(map.map.point_in_world.size()) + " points, " +
+                         DescribeMeanError(map.bundles) + ", " + DescribeRounded(map.camera));
+      TellRelocalised(map.relocalised, progress_);
+      break;
+    case SlamStage::kPureRotation:
+      progress_.EndStage("explains " + std::to_string(map.num_rotation_observations) +
+                         " observations, " + DescribeRounded(map.camera));
+      break;
+    case SlamStage::kFrameRegistration:
+      progress_.EndStage(std::to_string(map.num_resected) + " resected, " +
+                         std::to_string(map.num_interpolated) + " interpolated");
+      break;
+    case SlamStage::kCloud:
+      TellCloud(map, options_.cloud_min_angle_deg, progress_);
+      break;
+    case SlamStage::kOrientations:
+      break;
+  }
+}
+
+bool SlamProgress::ShouldStop() {
+  if (!interruption_.IsRequested()) return false;
+  progress_.Say("interrupted: putting together what there is; once more ends at once");
+  return true;
+}
+
+}  // namespace rotslam

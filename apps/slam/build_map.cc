@@ -1,0 +1,434 @@
+#include "apps/slam/build_map.h"
+
+#include <algorithm>
+#include <functional>
+#include <iterator>
+#include <optional>
+#include <utility>
+
+#include "apps/slam/frame_registration.h"
+#include "apps/slam/map/cloud.h"
+#include "apps/slam/map/component_alignment.h"
+#include "apps/slam/map/pure_rotation.h"
+#include "apps/slam/map_correction/map_correction.h"
+#include "apps/slam/map_views.h"
+#include "rotodom/averaging/anchors.h"
+#include "rotodom/motion_blur/keypoint_blur.h"
+
+namespace rotslam {
+namespace {
+
+std::set<FrameId> AllFrames(const RotationMap& rotations) {
+  std::set<FrameId> frames;
+  for (const auto& [frame, rotation] : rotations) frames.insert(frame);
+  return frames;
+}
+
+std::map<FrameId, PoseCovariance> Moved(std::map<FrameId, PoseCovariance> covariances,
+                                        const Similarity& similarity) {
+  PoseCovariance J = PoseCovariance::Identity();
+  J.bottomRightCorner<3, 3>() = similarity.scale * similarity.turn.Matrix();
+  for (auto& [frame, covariance] : covariances) covariance = J * covariance * J.transpose();
+  return covariances;
+}
+
+void Append(Reconstruction& map, Reconstruction part) {
+  map.cam_from_world.insert(part.cam_from_world.begin(), part.cam_from_world.end());
+  map.center_in_world.insert(part.center_in_world.begin(), part.center_in_world.end());
+  map.point_in_world.insert(part.point_in_world.begin(), part.point_in_world.end());
+  std::move(part.tracks.begin(), part.tracks.end(), std::back_inserter(map.tracks));
+}
+
+// No map: every frame stands at the origin.
+MapResult WithoutMap(MapResult result, std::string failure) {
+  for (const auto& [frame, rotation] : result.cam_from_world) {
+    result.center_in_world[frame] = Eigen::Vector3d::Zero();
+  }
+  result.failure = std::move(failure);
+  return result;
+}
+
+// The whole sequence as one pure rotation; nothing of a map is left.
+MapResult PureRotationThroughout(const MapResult& moving,
+                                 const PureRotationResult& rotation,
+                                 const Orientations& orientations,
+                                 const AveragingOptions& options) {
+  MapResult result;
+  result.cam_from_world = FollowAnchors(
+      orientations.graph, orientations.cam_from_world, rotation.cam_from_world, options);
+  InterpolateUnknown(orientations, orientations.unconnected, result.cam_from_world);
+  result.camera = rotation.camera;
+  result.keyframes = moving.keyframes;
+  result.keyframe_tracks = moving.keyframe_tracks;
+  result.num_rotation_observations = rotation.num_observations;
+  result.held.push_back(
+      {result.cam_from_world.begin()->first,
+       result.cam_from_world.rbegin()->first,
+       static_cast<double>(rotation.num_observations) / NumObservations(result.keyframe_tracks)});
+  result.is_held_throughout = true;
+  return WithoutMap(std::move(result), {});
+}
+
+RotationRates RatesOf(const Orientations& orientations) {
+  return RatesOf(orientations.cam_from_world,
+                 [&](FrameId frame) { return orientations.timestamps_s[frame.value]; });
+}
+
+std::vector<Track> TracksOf(const Orientations& orientations, double blur_s_per_px) {
+  std::vector<Track> tracks = BuildTracks(
+      orientations.edge_matches, orientations.features, AllFrames(orientations.cam_from_world), 2);
+  SetMotionBlur(orientations.camera, RatesOf(orientations), blur_s_per_px, tracks);
+  return tracks;
+}
+
+// Frames whose tracks show too few points of the maps to place them by; in a segment their places
+// are known.
+std::set<FrameId> FramesApart(const std::vector<Track>& all_tracks,
+                              const RefinedComponents& refined,
+                              const MapResult& result,
+                              int min_points) {
+  std::set<TrackId> known;
+  for (const BundleResult& bundle : refined.bundles) {
+    for (const auto& [track, point] : bundle.reconstruction.point_in_world) known.insert(track);
+  }
+  std::map<FrameId, int> num_points;
+  for (const Track& track : all_tracks) {
+    if (!known.contains(track.id)) continue;
+    for (const Observation& observation : track.observations) ++num_points[observation.frame];
+  }
+  std::set<FrameId> apart;
+  for (const auto& [frame, rotation] : result.cam_from_world) {
+    if (num_points[frame] < min_points && SegmentAt(result.held, frame) == nullptr) {
+      apart.insert(frame);
+    }
+  }
+  return apart;
+}
+
+// The steps from orientations to the keyframes' map, in their order; each leaves in `result_` what
+// it has found.
+class KeyframeMapBuilder {
+ public:
+  KeyframeMapBuilder(const Orientations& orientations,
+                     const std::vector<Track>& all_tracks,
+                     const SlamOptions& options,
+                     ImageProvider* images,
+                     SlamObserver& observer);
+
+  MapResult Build();
+
+ private:
+  void FindPureRotationSegments();
+  void SelectKeyframes();
+  void SolveKnownRotation();
+  void AdjustComponents();
+  void CorrectMaps();
+  void AlignComponents();
+  std::optional<MapResult> PureRotationExplainsMore() const;
+
+  // Whether the camera stands still or rotates in its place from the first frame to the last, by
+  // what pairs of views say. Of such a camera a rotation tells the focal length.
+  bool StaysThroughout() const;
+  bool SeeksFocalLength() const { return StaysThroughout() && options_.ba.lens.refine_focal; }
+
+  MapViews ReadViews(const Reconstruction& map, const std::set<FrameId>& frames) const;
+  TrackCompletion CompletionByImages() const;
+  FrameDescription DescriptionByImages(const Camera& camera) const;
+
+  const Orientations& orientations_;
+  const std::vector<Track>& all_tracks_;
+  const SlamOptions& options_;
+  ImageProvider* images_;
+  SlamObserver& observer_;
+  BundleOptions bundle_options_;
+  TrackCompletion complete_;
+  RotationMap keyframe_rotations_;
+  RefinedComponents refined_;
+  bool has_off_axis_rotations_ = false;  // which another lens would explain, too
+  MapResult result_;
+};
+
+KeyframeMapBuilder::KeyframeMapBuilder(const Orientations& orientations,
+                                       const std::vector<Track>& all_tracks,
+                                       const SlamOptions& options,
+                                       ImageProvider* images,
+                                       SlamObserver& observer)
+    : orientations_(orientations),
+      all_tracks_(all_tracks),
+      options_(options),
+      images_(images),
+      observer_(observer),
+      bundle_options_(options.ba),
+      complete_(CompletionByImages()) {
+  bundle_options_.num_threads = options.num_threads;
+  result_.cam_from_world = orientations.cam_from_world;
+  result_.camera = orientations.camera;
+}
+
+MapResult KeyframeMapBuilder::Build() {
+  FindPureRotationSegments();
+  SelectKeyframes();
+  observer_.OnEnd(SlamStage::kTracks, result_);
+  if (StaysThroughout()) {
+    if (SeeksFocalLength()) {
+      if (auto rotation = PureRotationExplainsMore()) return *std::move(rotation);
+    }
+    result_.is_held_throughout = true;
+    return WithoutMap(std::move(result_), {});
+  }
+
+  SolveKnownRotation();
+  if (!result_.krot.Usable()) {
+    if (auto rotation = PureRotationExplainsMore()) return *std::move(rotation);
+    std::string failure = result_.krot.message;
+    if (result_.keyframe_tracks.empty()) {
+      failure += "; the camera moves too little in these " +
+                 std::to_string(result_.cam_from_world.size()) + " frames, give more of them";
+    }
+    return WithoutMap(std::move(result_), std::move(failure));
+  }
+
+  observer_.OnBegin(SlamStage::kBundleAdjustment, -1);
+  AdjustComponents();
+  CorrectMaps();
+  AlignComponents();
+  if (result_.components.empty()) {
+    if (auto rotation = PureRotationExplainsMore()) return *std::move(rotation);
+    return WithoutMap(std::move(result_), "bundle adjustment found no usable map");
+  }
+  observer_.OnEnd(SlamStage::kBundleAdjustment, result_);
+  if (auto rotation = PureRotationExplainsMore()) return *std::move(rotation);
+  return std::move(result_);
+}
+
+bool KeyframeMapBuilder::StaysThroughout() const {
+  const PureRotationSegment* everything =
+      SegmentAt(result_.held, result_.cam_from_world.begin()->first);
+  return everything != nullptr && everything->last == result_.cam_from_world.rbegin()->first;
+}
+
+void KeyframeMapBuilder::FindPureRotationSegments() {
+  result_.held = rotslam::FindPureRotationSegments(
+      orientations_.graph, result_.cam_from_world, options_.pure_rotation_segments);
+  if (StaysThroughout()) return;
+  const auto num_segments = result_.held.size();
+  result_.held = WithoutOffAxisRotations(
+      std::move(result_.held),
+      {orientations_.camera, orientations_.graph, result_.cam_from_world, all_tracks_},
+      options_.rotodom.relative_rotation,
+      bundle_options_);
+  has_off_axis_rotations_ = result_.held.size() < num_segments;
+}
+
+void KeyframeMapBuilder::SelectKeyframes() {
+  result_.keyframes = rotslam::SelectKeyframes(
+      result_.cam_from_world,
+      all_tracks_,
+      SeeksFocalLength() ? std::vector<PureRotationSegment>() : result_.held,
+      options_.keyframes);
+  result_.keyframe_tracks = RestrictTracks(all_tracks_, result_.keyframes, 3);
+  for (const FrameId frame : result_.keyframes) {
+    keyframe_rotations_[frame] = result_.cam_from_world.at(frame);
+  }
+}
+
+void KeyframeMapBuilder::SolveKnownRotation() {
+  observer_.OnBegin(SlamStage::kKnownRotation, -1);
+  KrotOptions options = options_.krot;
+  options.num_threads = options_.num_threads;
+  options.seed = options_.seed;
+  result_.krot = rotslam::SolveKnownRotation(keyframe_rotations_,
+                                             result_.keyframe_tracks,
+                                             orientations_.camera,
+                                             options,
+                                             OrientationSigmas(orientations_));
+  observer_.OnEnd(SlamStage::kKnownRotation, result_);
+}
+
+void KeyframeMapBuilder::AdjustComponents() {
+  refined_ = RefineComponents(keyframe_rotations_,
+                              result_.krot,
+                              result_.keyframe_tracks,
+                              result_.held,
+                              orientations_.camera,
+                              bundle_options_,
+                              complete_);
+  result_.camera = refined_.camera;
+}
+
+void KeyframeMapBuilder::CorrectMaps() {
+  if (!options_.relocalisation.enabled) return;
+  MapCorrectionSources sources;
+  for (const LoopCheck& check : orientations_.loops) {
+    sources.lookalikes.push_back({check.frame, check.match});
+  }
+  sources.places = orientations_.places;
+  sources.apart = FramesApart(all_tracks_, refined_, result_, options_.resection.min_inliers);
+  sources.describe = DescriptionByImages(refined_.camera);
+  sources.complete = complete_;
+  sources.held = result_.held;
+  result_.relocalised = rotslam::CorrectMaps(std::move(sources),
+                                             orientations_.camera,
+                                             result_.keyframe_tracks,
+                                             options_.relocalisation,
+                                             options_.seed,
+                                             bundle_options_,
+                                             refined_);
+  result_.keyframes.insert(result_.relocalised.begin(), result_.relocalised.end());
+  result_.camera = refined_.camera;
+}
+
+void KeyframeMapBuilder::AlignComponents() {
+  for (std::size_t k = 0; k < refined_.components.size(); ++k) {
+    MapComponent& component = refined_.components[k];
+    BundleResult& bundle = refined_.bundles[k];
+    if (!bundle.Usable() || bundle.reconstruction.center_in_world.size() < 2) continue;
+    if (!result_.components.empty()) {
+      component.placed_by_default = true;
+      const Similarity placed = AlignComponent(result_.map,
+                                               bundle.reconstruction,
+                                               {result_.cam_from_world,
+                                                orientations_.timestamps_s,
+                                                result_.held,
+                                                all_tracks_,
+                                                result_.camera,
+                                                options_.resection,
+                                                options_.num_threads});
+      bundle.reconstruction = Moved(bundle.reconstruction, placed);
+      bundle.pose_covariance = Moved(std::move(bundle.pose_covariance), placed);
+    }
+    result_.pose_covariance.merge(bundle.pose_covariance);
+    Append(result_.map, std::move(bundle.reconstruction));
+    result_.bundles.push_back(std::move(bundle.summary));
+    result_.components.push_back(std::move(component));
+    result_.cam_from_world = FollowAnchors(orientations_.graph,
+                                           result_.cam_from_world,
+                                           result_.map.cam_from_world,
+                                           options_.rotodom.averaging);
+  }
+}
+
+std::optional<MapResult> KeyframeMapBuilder::PureRotationExplainsMore() const {
+  if (!options_.pure_rotation_segments.enabled || has_off_axis_rotations_) return std::nullopt;
+  observer_.OnBegin(SlamStage::kPureRotation, -1);
+  const auto rotation = DetectPureRotation(orientations_.camera,
+                                           keyframe_rotations_,
+                                           result_.keyframe_tracks,
+                                           ExplanationBy(result_.bundles),
+                                           bundle_options_);
+  if (!rotation || !PairsAllowPureRotation(orientations_.graph,
+                                           WithBearingsOf(rotation->camera, all_tracks_),
+                                           rotation->camera.MeanFocal(),
+                                           options_.rotodom.relative_rotation)) {
+    return std::nullopt;
+  }
+  MapResult throughout =
+      PureRotationThroughout(result_, *rotation, orientations_, options_.rotodom.averaging);
+  observer_.OnEnd(SlamStage::kPureRotation, throughout);
+  return throughout;
+}
+
+MapViews KeyframeMapBuilder::ReadViews(const Reconstruction& map,
+                                       const std::set<FrameId>& frames) const {
+  MapViews views = ReadMapViews(
+      *images_, frames, [&](const std::string& problem) { observer_.OnMissingImage(problem); });
+  SetMotions(
+      {orientations_, all_tracks_, orientations_.camera, options_.resection, options_.num_threads},
+      map,
+      views);
+  return views;
+}
+
+// Null where tracks are not to be completed.
+TrackCompletion KeyframeMapBuilder::CompletionByImages() const {
+  if (!options_.completion.enabled || images_ == nullptr) return nullptr;
+  return [this](const Reconstruction& map, const Camera& camera) {
+    std::set<FrameId> frames;
+    for (const auto& [frame, center] : map.center_in_world) frames.insert(frame);
+    std::vector<Track> tracks = CompleteTracks(
+        map, ReadViews(map, frames), camera, options_.completion, options_.num_threads);
+    SetMotionBlur(camera, RatesOf(orientations_), options_.ba.blur_s_per_px, tracks);
+    return tracks;
+  };
+}
+
+// Null where images are not to be had.
+FrameDescription KeyframeMapBuilder::DescriptionByImages(const Camera& camera) const {
+  if (images_ == nullptr) return nullptr;
+  return [this, &camera](const Reconstruction& map, const std::set<FrameId>& frames) {
+    return DescribeViews(
+        ReadViews(map, frames), camera, options_.rotodom.features, options_.num_threads);
+  };
+}
+
+MapResult BuildKeyframeMapFrom(const Orientations& orientations,
+                               const std::vector<Track>& all_tracks,
+                               const SlamOptions& options,
+                               ImageProvider* images,
+                               SlamObserver& observer) {
+  return KeyframeMapBuilder(orientations, all_tracks, options, images, observer).Build();
+}
+
+void RegisterRemainingFrames(const Orientations& orientations,
+                             const std::vector<Track>& all_tracks,
+                             const SlamOptions& options,
+                             SlamObserver& observer,
+                             MapResult& result) {
+  observer.OnBegin(SlamStage::kFrameRegistration, -1);
+  RegisterFrames(orientations, all_tracks, options, result);
+  // Their neighbours have moved a little since.
+  std::set<FrameId> unknown = orientations.unconnected;
+  std::erase_if(unknown, [&](FrameId frame) { return result.map.cam_from_world.contains(frame); });
+  InterpolateUnknown(orientations, unknown, result.cam_from_world);
+  observer.OnEnd(SlamStage::kFrameRegistration, result);
+}
+
+void MakeCloud(const std::vector<Track>& all_tracks,
+               const SlamOptions& options,
+               SlamObserver& observer,
+               MapResult& result) {
+  observer.OnBegin(SlamStage::kCloud, -1);
+  BundleOptions bundle_options = options.ba;
+  bundle_options.num_threads = options.num_threads;
+  const Reconstruction all_points = MakeCloudOf({result.camera,
+                                                 result.cam_from_world,
+                                                 result.center_in_world,
+                                                 result.map.point_in_world,
+                                                 result.held},
+                                                all_tracks,
+                                                bundle_options);
+  result.cloud = WithoutShallowPoints(all_points, options.cloud_min_angle_deg);
+  result.num_shallow_points =
+      static_cast<int>(all_points.point_in_world.size() - result.cloud.point_in_world.size());
+  const PointMap rest = WithoutOutliers(result.cloud.point_in_world, options.cloud_outliers);
+  result.num_cloud_outliers = static_cast<int>(result.cloud.point_in_world.size() - rest.size());
+  result.cloud.point_in_world = rest;
+  std::erase_if(result.cloud.tracks, [&](const Track& track) { return !rest.contains(track.id); });
+  observer.OnEnd(SlamStage::kCloud, result);
+}
+
+}  // namespace
+
+MapResult BuildKeyframeMap(const Orientations& orientations,
+                           const SlamOptions& options,
+                           SlamObserver& observer) {
+  observer.OnBegin(SlamStage::kTracks, -1);
+  return BuildKeyframeMapFrom(
+      orientations, TracksOf(orientations, options.ba.blur_s_per_px), options, nullptr, observer);
+}
+
+MapResult BuildMap(const Orientations& orientations,
+                   const SlamOptions& options,
+                   ImageProvider* images,
+                   SlamObserver& observer) {
+  observer.OnBegin(SlamStage::kTracks, -1);
+  std::vector<Track> all_tracks = TracksOf(orientations, options.ba.blur_s_per_px);
+  MapResult result = BuildKeyframeMapFrom(orientations, all_tracks, options, images, observer);
+  if (result.components.empty()) return result;
+  all_tracks = WithBearingsOf(result.camera, std::move(all_tracks));
+  RegisterRemainingFrames(orientations, all_tracks, options, observer, result);
+  MakeCloud(all_tracks, options, observer, result);
+  return result;
+}
+
+}  // namespace rotslam

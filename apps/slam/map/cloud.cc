@@ -1,0 +1,26 @@
+#include "apps/slam/map/cloud.h"
+
+namespace rotslam {
+
+Reconstruction MakeCloudOf(const CloudSources& sources,
+                           const std::vector<Track>& tracks,
+                           const BundleOptions& options) {
+  BundleProblem problem;
+  problem.camera = sources.camera;
+  problem.start.cam_from_world = sources.cam_from_world;
+  problem.start.center_in_world = sources.center_in_world;
+  problem.start.point_in_world = sources.point_in_world;
+  problem.start.tracks = tracks;
+  std::erase_if(problem.start.tracks, [&](const Track& track) {
+    return static_cast<int>(track.observations.size()) < options.min_observations;
+  });
+  for (const PureRotationSegment& segment : sources.held) {
+    for (const auto& [frame, rotation] : sources.cam_from_world) {
+      if (segment.first < frame && frame <= segment.last)
+        problem.shared_center[frame] = segment.first;
+    }
+  }
+  return TriangulateTracks(problem, options);
+}
+
+}  // namespace rotslam

@@ -1,0 +1,28 @@
+#pragma once
+
+#include <vector>
+
+#include "ba/bundle_adjustment.h"
+#include "rotodom/camera/camera.h"
+#include "rotodom/types/maps.h"
+#include "rotodom/types/pure_rotation_segment.h"
+#include "rotodom/types/reconstruction.h"
+#include "rotodom/types/track.h"
+
+namespace rotslam {
+
+/// Poses of all frames, from which a cloud is triangulated.
+struct CloudSources {
+  const Camera& camera;
+  const RotationMap& cam_from_world;
+  const CenterMap& center_in_world;
+  const PointMap& point_in_world;  // known ones, where triangulation starts
+  const std::vector<PureRotationSegment>& held;
+};
+
+/// Points of all tracks, not only the keyframes', from the poses of all frames.
+Reconstruction MakeCloudOf(const CloudSources& sources,
+                           const std::vector<Track>& tracks,
+                           const BundleOptions& options);
+
+}  // namespace rotslam

@@ -1,0 +1,138 @@
+#include "apps/slam/map/refinement.h"
+
+#include <algorithm>
+#include <array>
+#include <cstdint>
+#include <cstdio>
+#include <cstdlib>
+#include <iterator>
+#include <map>
+#include <utility>
+
+#include "rotodom/tracks/keyframes.h"
+
+namespace rotslam {
+namespace {
+
+// Keyframes of each component of the known-rotation solution, by first keyframe.
+std::vector<MapComponent> ComponentsOf(const KrotSolution& krot) {
+  std::map<int, MapComponent> by_number;
+  for (const auto& [frame, number] : krot.component) {
+    if (krot.center_in_world.contains(frame)) by_number[number].keyframes.insert(frame);
+  }
+  std::vector<MapComponent> components;
+  for (auto& [number, component] : by_number) {
+    if (component.keyframes.size() >= 2) components.push_back(std::move(component));
+  }
+  std::sort(components.begin(), components.end(), [](const MapComponent& a, const MapComponent& b) {
+    return *a.keyframes.begin() < *b.keyframes.begin();
+  });
+  return components;
+}
+
+// Position of the component with the most observations.
+std::size_t LargestComponent(const std::vector<MapComponent>& components,
+                             const std::vector<Track>& tracks) {
+  std::map<FrameId, int> count;
+  for (const Track& track : tracks) {
+    for (const Observation& observation : track.observations) ++count[observation.frame];
+  }
+  std::size_t largest = 0;
+  int most = 0;
+  for (std::size_t k = 0; k < components.size(); ++k) {
+    int sum = 0;
+    for (const FrameId frame : components[k].keyframes) sum += count[frame];
+    if (sum <= most) continue;
+    most = sum;
+    largest = k;
+  }
+  return largest;
+}
+
+}  // namespace
+
+BundleOptions WithLensHeld(BundleOptions options) {
+  options.lens.refine_focal = options.lens.refine_distortion = false;
+  options.lens.refine_principal_point = false;
+  return options;
+}
+
+BundleResult RefineComponent(const MapComponent& component,
+                             const RotationMap& cam_from_world,
+                             const CenterMap& center_in_world,
+                             const std::vector<Track>& tracks,
+                             const std::vector<PureRotationSegment>& held,
+                             const Camera& camera,
+                             const BundleOptions& options,
+                             const TrackCompletion& complete) {
+  BundleProblem problem;
+  problem.camera = camera;
+  for (const FrameId frame : component.keyframes) {
+    problem.start.cam_from_world[frame] = cam_from_world.at(frame);
+    problem.start.center_in_world[frame] = center_in_world.at(frame);
+  }
+  for (const PureRotationSegment& stretch : held) {
+    if (component.keyframes.contains(stretch.first) && component.keyframes.contains(stretch.last)) {
+      problem.shared_center[stretch.last] = stretch.first;
+    }
+  }
+  problem.start.tracks = RestrictTracks(tracks, component.keyframes, 2);
+  return RefineBundle(problem, options, complete);
+}
+
+std::vector<Track> WithBearingsOf(const Camera& camera, std::vector<Track> tracks) {
+  for (Track& track : tracks) {
+    for (Observation& observation : track.observations) {
+      const auto bearing = camera.Unproject(observation.keypoint_px);
+      if (bearing) observation.bearing = *bearing;
+    }
+  }
+  return tracks;
+}
+
+RefinedComponents RefineComponents(const RotationMap& cam_from_world,
+                                   const KrotSolution& krot,
+                                   const std::vector<Track>& tracks,
+                                   const std::vector<PureRotationSegment>& held,
+                                   const Camera& camera,
+                                   const BundleOptions& options,
+                                   const TrackCompletion& complete) {
+  RefinedComponents refined;
+  refined.camera = camera;
+  refined.components = ComponentsOf(krot);
+  refined.bundles.resize(refined.components.size());
+  if (refined.components.empty()) return refined;
+  const auto refine =
+      [&](std::size_t k, const std::vector<Track>& seen, const BundleOptions& bundle_options) {
+        refined.bundles[k] = RefineComponent(refined.components[k],
+                                             cam_from_world,
+                                             krot.center_in_world,
+                                             seen,
+                                             held,
+                                             refined.camera,
+                                             bundle_options,
+                                             complete);
+      };
+  const std::size_t first = LargestComponent(refined.components, tracks);
+  refine(first, tracks, options);
+  refined.camera = refined.bundles[first].camera;
+  if (refined.components.size() == 1) return refined;
+  const BundleOptions same_lens = WithLensHeld(options);
+  const std::vector<Track> seen = WithBearingsOf(refined.camera, tracks);
+  for (std::size_t k = 0; k < refined.components.size(); ++k) {
+    if (k != first) refine(k, seen, same_lens);
+  }
+  return refined;
+}
+
+double MeanErrorPx(const std::vector<BundleSummary>& bundles) {
+  std::int64_t observations = 0;
+  double sum_px = 0.0;
+  for (const BundleSummary& bundle : bundles) {
+    observations += bundle.num_observations;
+    sum_px += bundle.after.mean_px * bundle.num_observations;
+  }
+  return observations == 0 ? 0.0 : sum_px / static_cast<double>(observations);
+}
+
+}  // namespace rotslam

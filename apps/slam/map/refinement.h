@@ -1,0 +1,60 @@
+#pragma once
+
+#include <set>
+#include <string>
+#include <vector>
+
+#include "ba/bundle_adjustment.h"
+#include "krot/known_rotation.h"
+#include "rotodom/types/pure_rotation_segment.h"
+
+namespace rotslam {
+
+/// Keyframes whose relative scale is known: they share tracks with depth.
+struct MapComponent {
+  std::set<FrameId> keyframes;
+  bool placed_by_default = false;  // its scale and place rest on continuity, not on measurements
+};
+
+/// The components of a known-rotation solution, each refined in its own scale.
+struct RefinedComponents {
+  std::vector<MapComponent> components;  // of at least two views, by their first keyframe
+  std::vector<BundleResult> bundles;     // one per component, not all of them usable
+  Camera camera;                         // as the component with the most observations refined it
+};
+
+/// Bundle adjustment of one component, in its own scale, from poses of all its keyframes.
+BundleResult RefineComponent(const MapComponent& component,
+                             const RotationMap& cam_from_world,
+                             const CenterMap& center_in_world,
+                             const std::vector<Track>& tracks,
+                             const std::vector<PureRotationSegment>& held,
+                             const Camera& camera,
+                             const BundleOptions& options,
+                             const TrackCompletion& complete);
+
+/// The options with the lens left as it is.
+BundleOptions WithLensHeld(BundleOptions options);
+
+/// Bundle adjustment of every component from its known-rotation positions. The component with the
+/// most observations refines the lens, as far as the options let it, and the others take it over.
+/// @param cam_from_world  of every view that the solution has placed.
+/// @param tracks          those that the solution was found from; all are judged anew.
+/// @param held            segments without movement: where both ends are keyframes of a component
+///                        they share a centre.
+/// @param complete        as RefineBundle takes it.
+RefinedComponents RefineComponents(const RotationMap& cam_from_world,
+                                   const KrotSolution& krot,
+                                   const std::vector<Track>& tracks,
+                                   const std::vector<PureRotationSegment>& held,
+                                   const Camera& camera,
+                                   const BundleOptions& options,
+                                   const TrackCompletion& complete = nullptr);
+
+/// Mean reprojection error over the observations of all bundles; zero where there are none.
+double MeanErrorPx(const std::vector<BundleSummary>& bundles);
+
+/// The tracks with the bearings that `camera` gives their keypoints.
+std::vector<Track> WithBearingsOf(const Camera& camera, std::vector<Track> tracks);
+
+}  // namespace rotslam

@@ -1,0 +1,61 @@
+#include "apps/slam/map/resect_frames.h"
+
+#include <iterator>
+#include <optional>
+
+#include "rotodom/types/parallel.h"
+
+namespace rotslam {
+
+Eigen::Vector3d InterpolatedCenter(const CenterMap& centers,
+                                   const std::vector<double>& timestamps_s,
+                                   FrameId frame) {
+  const auto after = centers.lower_bound(frame);
+  if (after == centers.end()) return centers.rbegin()->second;
+  if (after->first == frame || after == centers.begin()) return after->second;
+  const auto before = std::prev(after);
+  const double from_s = timestamps_s[before->first.value];
+  const double to_s = timestamps_s[after->first.value];
+  const double weight = (timestamps_s[frame.value] - from_s) / (to_s - from_s);
+  return (1.0 - weight) * before->second + weight * after->second;
+}
+
+std::map<FrameId, ResectedPose> ResectFrames(const std::map<FrameId, ResectionStart>& starts,
+                                             const PointMap& points,
+                                             const std::vector<Track>& tracks,
+                                             const Camera& camera,
+                                             const ResectionOptions& options,
+                                             int num_threads) {
+  struct SeenFrame {
+    FrameId id;
+    const ResectionStart* start;
+    std::vector<PointSighting> sightings;
+    std::optional<ResectedPose> pose;
+  };
+  std::vector<SeenFrame> frames;
+  std::map<FrameId, int> place;
+  for (const auto& [frame, start] : starts) {
+    place[frame] = static_cast<int>(frames.size());
+    frames.push_back({frame, &start, {}, std::nullopt});
+  }
+  for (const Track& track : tracks) {
+    const auto point = points.find(track.id);
+    if (point == points.end()) continue;
+    for (const Observation& observation : track.observations) {
+      const auto seen_from = place.find(observation.frame);
+      if (seen_from == place.end()) continue;
+      frames[seen_from->second].sightings.push_back(
+          {point->second, observation.keypoint_px, observation.sigma_px, observation.blur});
+    }
+  }
+  ParallelFor(static_cast<int>(frames.size()), num_threads, [&](int k) {
+    frames[k].pose = ResectFrame(camera, frames[k].sightings, *frames[k].start, options);
+  });
+  std::map<FrameId, ResectedPose> poses;
+  for (const SeenFrame& frame : frames) {
+    if (frame.pose) poses[frame.id] = *frame.pose;
+  }
+  return poses;
+}
+
+}  // namespace rotslam

@@ -1,0 +1,161 @@
+#include "apps/slam/map_correction/map_correction.h"
+
+#include <iterator>
+#include <utility>
+
+#include "apps/slam/map_correction/place_matches.h"
+#include "apps/slam/map_correction/refine_relocalised.h"
+
+namespace rotslam {
+namespace {
+
+// A frame and those next to it.
+template <class Value>
+std::set<FrameId> Around(FrameId frame, const std::map<FrameId, Value>& frames) {
+  constexpr int kAround = 2;
+  std::set<FrameId> around;
+  auto from = frames.lower_bound(frame);
+  auto to = frames.upper_bound(frame);
+  for (int k = 0; k < kAround && from != frames.begin(); ++k) --from;
+  for (int k = 0; k < kAround && to != frames.end(); ++k) ++to;
+  for (; from != to; ++from) around.insert(from->first);
+  return around;
+}
+
+// Those that have moved, and those next to them.
+std::set<FrameId> DoubtfulFrames(const RelocalisedMap& map) {
+  std::set<FrameId> doubtful;
+  for (const FrameId frame : map.moved) doubtful.merge(Around(frame, map.center_in_world));
+  return doubtful;
+}
+
+// Describes the doubtful frames that are no places yet; whether there are any.
+bool DescribeDoubtful(const RelocalisedMap& map, MapCorrectionSources& sources) {
+  std::set<FrameId> frames = DoubtfulFrames(map);
+  std::erase_if(frames, [&](FrameId frame) { return sources.places.contains(frame); });
+  if (frames.empty() || !sources.describe) return false;
+  Reconstruction poses;
+  poses.cam_from_world = map.cam_from_world;
+  poses.center_in_world = map.center_in_world;
+  sources.places.merge(sources.describe(poses, frames));
+  return true;
+}
+
+// Has the doubtful frames compared with what looks like those that have moved next to them; whether
+// there is anything to compare.
+bool CompareDoubtful(const RelocalisedMap& map, MapCorrectionSources& sources) {
+  std::map<FrameId, std::set<FrameId>> matches;  // that stand, of frames that have moved
+  for (const auto& [frame, match] : sources.lookalikes) {
+    if (map.moved.contains(frame) && !map.moved.contains(match)) matches[frame].insert(match);
+    if (map.moved.contains(match) && !map.moved.contains(frame)) matches[match].insert(frame);
+  }
+  std::set<std::pair<FrameId, FrameId>> pairs;
+  for (const auto& [moved, alike] : matches) {
+    for (const FrameId frame : Around(moved, map.center_in_world)) {
+      for (const FrameId match : alike) {
+        if (frame != match) pairs.emplace(frame, match);
+      }
+    }
+  }
+  for (const auto& [frame, match] : sources.lookalikes) pairs.erase({frame, match});
+  for (const auto& [frame, match] : pairs) sources.lookalikes.push_back({frame, match});
+  return !pairs.empty();
+}
+
+// For each frame that tracks see, or that is apart, but that no map holds, if it is a place, one
+// that holds nothing else.
+std::vector<Reconstruction> MapsOfLost(const std::vector<Track>& tracks,
+                                       const std::set<FrameId>& apart,
+                                       const std::map<FrameId, Features>& places,
+                                       const RefinedComponents& refined) {
+  std::set<FrameId> lost = apart;
+  for (const Track& track : tracks) {
+    for (const Observation& observation : track.observations) lost.insert(observation.frame);
+  }
+  for (const BundleResult& bundle : refined.bundles) {
+    for (const auto& [frame, center] : bundle.reconstruction.center_in_world) lost.erase(frame);
+  }
+  std::vector<Reconstruction> maps;
+  for (const FrameId frame : lost) {
+    if (!places.contains(frame)) continue;
+    Reconstruction& map = maps.emplace_back();
+    map.cam_from_world[frame] = Rotation();
+    map.center_in_world[frame] = Eigen::Vector3d::Zero();
+  }
+  return maps;
+}
+
+// The pairs, and what else may find frames of one map in another one: those the other way round,
+// and the places before and behind them.
+std::vector<Lookalike> PairsAcross(const std::vector<const Reconstruction*>& maps,
+                                   const std::map<FrameId, Features>& places,
+                                   std::vector<Lookalike> pairs) {
+  std::map<FrameId, const Reconstruction*> map_of;
+  for (const Reconstruction* map : maps) {
+    for (const auto& [frame, center] : map->center_in_world) map_of[frame] = map;
+  }
+  // Whether there are points in which the frame may be found.
+  const auto is_across = [&](FrameId frame, FrameId match) {
+    const auto from = map_of.find(frame);
+    const auto to = map_of.find(match);
+    return from != map_of.end() && to != map_of.end() && from->second != to->second &&
+           !to->second->point_in_world.empty();
+  };
+  const std::size_t num_pairs = pairs.size();
+  for (std::size_t k = 0; k < num_pairs; ++k) {
+    const auto [frame, match] = pairs[k];
+    if (is_across(match, frame)) pairs.push_back({match, frame});
+  }
+  for (const auto& [frame, map] : map_of) {
+    for (const FrameId other : Around(frame, places)) {
+      if (is_across(frame, other)) pairs.push_back({frame, other});
+    }
+  }
+  return pairs;
+}
+
+}  // namespace
+
+std::set<FrameId> CorrectMaps(MapCorrectionSources sources,
+                              const Camera& calibrated,
+                              std::vector<Track> tracks,
+                              const RelocalisationOptions& options,
+                              std::uint64_t seed,
+                              const BundleOptions& bundle_options,
+                              RefinedComponents& refined) {
+  // Where some stand right, others are seen to stand wrong.
+  constexpr int kMaxPasses = 3;
+  PlaceMatches places(sources.places, refined.camera);
+  const auto relocalise = [&]() {
+    const std::vector<Reconstruction> lost =
+        MapsOfLost(tracks, sources.apart, sources.places, refined);
+    std::vector<const Reconstruction*> maps;
+    for (const BundleResult& bundle : refined.bundles) maps.push_back(&bundle.reconstruction);
+    for (const Reconstruction& map : lost) maps.push_back(&map);
+    return Relocalise(maps,
+                      tracks,
+                      places,
+                      PairsAcross(maps, sources.places, sources.lookalikes),
+                      refined.camera,
+                      options,
+                      seed,
+                      bundle_options.num_threads);
+  };
+  std::set<FrameId> moved;
+  for (int pass = 0; pass < kMaxPasses; ++pass) {
+    std::vector<RelocalisedMap> changed = relocalise();
+    bool has_more = false;
+    for (const RelocalisedMap& map : changed) {
+      has_more |= DescribeDoubtful(map, sources);
+      has_more |= CompareDoubtful(map, sources);
+    }
+    if (has_more) changed = relocalise();
+    const std::set<FrameId> now = RefineRelocalised(
+        changed, sources.held, calibrated, bundle_options, sources.complete, tracks, refined);
+    if (now.empty()) break;
+    moved.insert(now.begin(), now.end());
+  }
+  return moved;
+}
+
+}  // namespace rotslam

@@ -1,0 +1,58 @@
+#pragma once
+
+#include <string>
+
+#include "rotodom/loop/looped_odometry.h"
+#include "rotodom/rolling_shutter/readout.h"
+#include "rotodom/sequence/sequence.h"
+
+namespace rotslam {
+
+struct MapResult;
+struct Orientations;
+
+/// The stages of the system, in their order.
+enum class SlamStage {
+  kOrientations,       // of every frame
+  kTracks,             // pure-rotation segments, keyframes, and what they see
+  kKnownRotation,      // positions of the keyframes, their orientations being known
+  kBundleAdjustment,   // of the keyframes, with the map corrected and its components aligned
+  kPureRotation,       // whether the camera only rotates throughout
+  kFrameRegistration,  // poses of the frames between the keyframes
+  kCloud,              // points as all frames see them
+};
+
+/// One frame of the first stage.
+struct FrameProgress {
+  const Frame& frame;  // without its image
+  const LoopedEstimate& estimate;
+  const OdometryResult& odometry;  // so far, this frame included
+};
+
+/// Is told how the system gets on, and may ask it to stop. Calls come from the thread that runs
+/// the system; values are valid during the call. Every method may be left as it is.
+class SlamObserver {
+ public:
+  virtual ~SlamObserver() = default;
+
+  /// @param num_steps  frames that the stage will take one by one; negative where it has no steps
+  ///                   or their number is not known.
+  virtual void OnBegin(SlamStage /*stage*/, int /*num_steps*/) {}
+  virtual void OnFrame(const FrameProgress& /*progress*/) {}
+  /// The images tell how the sensor is read out. The first stage starts again with it.
+  virtual void OnReadoutFound(const ReadoutEstimate& /*readout*/) {}
+  /// An image of a frame of the map cannot be read again; points are not looked for in it.
+  virtual void OnMissingImage(const std::string& /*problem*/) {}
+  /// Pass number `pass`, from 1, over the beginning of the sequence for the focal length.
+  virtual void OnFocalPass(int /*pass*/, double /*focal_px*/) {}
+
+  /// The first stage has ended; some fields of `orientations` are the results of later stages.
+  virtual void OnEnd(SlamStage /*stage*/, const Orientations& /*orientations*/) {}
+  /// A later stage has ended; `map` has what is known by then.
+  virtual void OnEnd(SlamStage /*stage*/, const MapResult& /*map*/) {}
+
+  /// Asked after every frame of the first stage; true ends it, with the frames so far.
+  virtual bool ShouldStop() { return false; }
+};
+
+}  // namespace rotslam
