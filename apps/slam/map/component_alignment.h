@@ -6,6 +6,7 @@
 #include "rotodom/camera/camera.h"
 #include "rotodom/types/maps.h"
 #include "rotodom/types/pure_rotation_segment.h"
+#include "rotodom/types/reconstruction.h"
 #include "rotodom/types/similarity.h"
 #include "rotodom/types/track.h"
 

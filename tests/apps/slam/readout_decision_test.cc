@@ -77,8 +77,8 @@ TEST(ReadoutDecision, AsksNothingThatIsKnownOrNotWanted) {
   camera.knows_readout = true;
   SlamOptions unwanted;
   unwanted.readout.enabled = false;
-  for (ReadoutDecision watch :
-       {ReadoutDecision(camera, {}, 2), ReadoutDecision(footage.camera, unwanted, 2)}) {
+  for (ReadoutDecision watch : {ReadoutDecision(camera, TwoThreads({})),
+                                ReadoutDecision(footage.camera, TwoThreads(unwanted))}) {
     EXPECT_FALSE(watch.IsOn());
     Show(footage, watch);
     watch.Finish(ResultOf(footage));
@@ -86,19 +86,14 @@ TEST(ReadoutDecision, AsksNothingThatIsKnownOrNotWanted) {
   }
 }
 
-TEST(SetReadout, IsWhatACameraFileWouldHaveSaid) {
-  Input input;
+TEST(WithReadout, IsWhatACameraFileWouldHaveSaid) {
   ReadoutEstimate readout;
   readout.readout_s = 0.02031;
-  readout.sigma_s = 0.00021;
   readout.readout_from = ReadoutStart::kRight;
-  SetReadout(readout, input);
-  EXPECT_EQ(input.camera.readout_s, 0.02031);
-  EXPECT_EQ(input.camera.readout_from, ReadoutStart::kRight);
-  EXPECT_TRUE(input.camera.knows_readout);
-  EXPECT_TRUE(input.readout.has_value());
-  EXPECT_EQ(DescribeReadout(readout), "20.3 +- 0.2 ms from the right");
-  EXPECT_EQ(CameraLines(readout), "readout_s: 0.0203, readout_from: right");
+  const Camera camera = WithReadout(Camera(), readout);
+  EXPECT_EQ(camera.readout_s, 0.02031);
+  EXPECT_EQ(camera.readout_from, ReadoutStart::kRight);
+  EXPECT_TRUE(camera.knows_readout);
 }
 
 }  // namespace

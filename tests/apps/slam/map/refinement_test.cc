@@ -9,6 +9,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include "apps/slam/map_correction/refine_relocalised.h"
 #include "tests/scenes/alignment.h"
 #include "tests/scenes/scene.h"
 
@@ -333,14 +334,6 @@ TEST(MeanError, CountsEveryObservationOnce) {
   small.after.mean_px = 0.1;
   EXPECT_NEAR(MeanErrorPx({small, large}), 0.4, 1e-12);
   EXPECT_EQ(MeanErrorPx({}), 0.0);
-  EXPECT_EQ(DescribeMeanError({small, large}), "mean error 0.4 px");
-}
-
-TEST(DescribeRounded, KeepsFiveDigits) {
-  Camera camera;
-  camera.fx = 502.2993847;
-  camera.fy = 1489.44449;
-  EXPECT_THAT(DescribeRounded(camera), testing::HasSubstr("fx 502.3, fy 1489.4,"));
 }
 
 }  // namespace
