@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "rotodom/camera/read_camera.h"
+#include "rotodom/sequence/photometric.h"
 #include "rotodom/sequence/sequence.h"
 
 namespace rotslam {
@@ -29,6 +30,7 @@ struct Layout {
   std::optional<CameraReference> camera;                   // calibration that lies with the images
   std::optional<Camera> own_camera;                        // calibration that the form itself says
   std::optional<std::filesystem::path> ground_truth_file;  // a file, or a folder of pose files
+  std::optional<PhotometricFiles> photometric;             // takes the vignetting out of the images
   std::vector<std::string> notes;  // assumed, left out or ignored; one line each
 };
 

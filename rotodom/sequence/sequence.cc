@@ -66,6 +66,7 @@ class FileSequence : public Sequence {
     num_frames_ = static_cast<int>(entries_.size());
     CheckIncreasing(entries_, layout.time_list);
     FindImageSize();
+    if (layout.photometric) photometric_.emplace(*layout.photometric, image_size_);
   }
 
   void Skip(int count) override {
@@ -127,12 +128,15 @@ class FileSequence : public Sequence {
     }
     frame.image = std::move(decoded.image);
     frame.problem = std::move(decoded.problem);
+    // An image of another size is refused by Next().
+    if (photometric_ && frame.image.size() == image_size_) photometric_->Apply(frame.image);
     return frame;
   }
 
   std::vector<ImageEntry> entries_;
   std::vector<fs::path> all_files_;  // also those that first, last and stride leave out
   PixelScale scale_;
+  std::optional<PhotometricCorrection> photometric_;
   int next_ = 0;
   // Image next_, decoded while the caller works on the one before.
   std::future<DecodedImage> ahead_;

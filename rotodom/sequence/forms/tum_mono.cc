@@ -26,10 +26,17 @@ Layout ListTumMono(const fs::path& path, const SequenceOptions& options) {
   if (!layout.ground_truth_file) {
     layout.ground_truth_file = FirstFile({root / "groundtruthSync.txt"});
   }
-  for (const char* name : {"pcalib.txt", "vignette.png"}) {
-    if (!IsFile(root / name)) continue;
-    layout.notes.push_back(std::string(name) +
-                           " (photometric calibration) is not used: features do not need it");
+  PhotometricFiles photometric;
+  photometric.inverse_response = FirstFile({root / "pcalib.txt"});
+  photometric.vignette = FirstFile({root / "vignette.png"});
+  if (photometric.vignette) {
+    layout.notes.push_back(
+        "vignetting is taken out as vignette.png" +
+        std::string(photometric.inverse_response ? " and pcalib.txt say" : " says"));
+    layout.photometric = photometric;
+  } else if (photometric.inverse_response) {
+    layout.notes.push_back(
+        "pcalib.txt (the camera's response) is not used: no vignette.png is there");
   }
   return layout;
 }
