@@ -10,7 +10,7 @@
 #include "rotodom/matching/patch_alignment.h"
 #include "rotodom/motion_blur/blurred_patch.h"
 #include "rotodom/motion_blur/keypoint_blur.h"
-#include "rotodom/relative_rotation/normal_epipolar.h"
+#include "rotodom/relative_rotation/align_bearings.h"
 #include "rotodom/types/median.h"
 #include "rotodom/types/options.h"
 #include "rotodom/types/parallel.h"

@@ -4,8 +4,8 @@
 
 #include <gtest/gtest.h>
 
-#include "rotodom/relative_rotation/normal_epipolar.h"
 #include "rotodom/relative_rotation/relative_rotation.h"
+#include "tests/rotodom/relative_rotation/normal_epipolar.h"
 #include "tests/rotodom/relative_rotation/opengv_reference.h"
 #include "tests/rotodom/relative_rotation/pair_scene.h"
 
@@ -23,12 +23,12 @@ double Median(std::vector<double> values) {
 
 // OpenGV's eigensolver minimises the same cost, so from the same start both end at the same
 // rotation.
-TEST(MinimizeNormalEpipolar, AgreesWithOpenGv) {
+TEST(MinimiseNormalEpipolar, AgreesWithOpenGv) {
   for (const double baseline : {0.05, 0.1, 0.2}) {
     const PairScene scene = MakePairScene({.baseline_over_depth = baseline, .noise_px = 0.3});
     NormalEpipolarSums sums;
     for (const BearingPair& pair : scene.pairs) sums.Add(pair);
-    const NormalEpipolarMinimum ours = MinimizeNormalEpipolar(sums, Rotation(), 50);
+    const NormalEpipolarMinimum ours = MinimiseNormalEpipolar(sums, Rotation(), 50);
     const Rotation theirs = OpenGvReference(scene.pairs, kPairFocalPx).Eigensolver();
     EXPECT_LT((ours.j_from_i * theirs.Inverse()).AngleDeg(), 2e-3) << baseline;
   }

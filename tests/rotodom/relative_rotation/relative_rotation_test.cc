@@ -10,7 +10,8 @@
 
 #include <gtest/gtest.h>
 
-#include "rotodom/relative_rotation/normal_epipolar.h"
+#include "rotodom/relative_rotation/align_bearings.h"
+#include "tests/rotodom/relative_rotation/normal_epipolar.h"
 #include "tests/rotodom/relative_rotation/pair_scene.h"
 
 namespace rotslam {
@@ -32,22 +33,22 @@ double MedianErrorDeg(PairSceneOptions scene_options, int num_scenes) {
   return errors[errors.size() / 2];
 }
 
-TEST(MinimizeNormalEpipolar, FindsTheTruthFromCleanPairs) {
+TEST(MinimiseNormalEpipolar, FindsTheTruthFromCleanPairs) {
   const PairScene scene = MakePairScene({.noise_px = 0.0, .rotation_deg = 2.0});
   NormalEpipolarSums sums;
   for (const BearingPair& pair : scene.pairs) sums.Add(pair);
-  const NormalEpipolarMinimum minimum = MinimizeNormalEpipolar(sums, Rotation(), 50);
+  const NormalEpipolarMinimum minimum = MinimiseNormalEpipolar(sums, Rotation(), 50);
   EXPECT_LT(ErrorDeg(minimum.j_from_i, scene.j_from_i), 1e-6);
   EXPECT_NEAR(std::abs(minimum.translation_direction.dot(scene.translation_direction)), 1.0, 1e-9);
 }
 
-TEST(MinimizeNormalEpipolar, SumsEqualTheSlowDefinition) {
+TEST(MinimiseNormalEpipolar, SumsEqualTheSlowDefinition) {
   const PairScene scene = MakePairScene({.num_pairs = 50});
   NormalEpipolarSums sums;
   Eigen::Matrix3d M = Eigen::Matrix3d::Zero();
   const NormalEpipolarMinimum minimum = [&] {
     for (const BearingPair& pair : scene.pairs) sums.Add(pair);
-    return MinimizeNormalEpipolar(sums, Rotation(), 50);
+    return MinimiseNormalEpipolar(sums, Rotation(), 50);
   }();
   for (const BearingPair& pair : scene.pairs) {
     const Eigen::Vector3d n = (minimum.j_from_i * pair.bearing_i).cross(pair.bearing_j);

@@ -1,4 +1,4 @@
-#include "rotodom/relative_rotation/normal_epipolar.h"
+#include "tests/rotodom/relative_rotation/normal_epipolar.h"
 
 #include <algorithm>
 #include <cmath>
@@ -46,7 +46,7 @@ void NormalEpipolarSums::Add(const BearingPair& pair, double weight) {
   S_.noalias() += weight * q * q.transpose();
 }
 
-NormalEpipolarMinimum MinimizeNormalEpipolar(const NormalEpipolarSums& sums,
+NormalEpipolarMinimum MinimiseNormalEpipolar(const NormalEpipolarSums& sums,
                                              const Rotation& start_j_from_i,
                                              int max_iterations) {
   const Matrix9& S = sums.S();
@@ -90,18 +90,6 @@ NormalEpipolarMinimum MinimizeNormalEpipolar(const NormalEpipolarSums& sums,
     if (!improved || step_length < 1e-9) break;
   }
   return {j_from_i, current.direction, current.value};
-}
-
-std::optional<Rotation> AlignBearings(std::span<const BearingPair> pairs) {
-  if (pairs.size() < 2) return std::nullopt;
-  Eigen::Matrix3d sum = Eigen::Matrix3d::Zero();
-  for (const BearingPair& pair : pairs) sum += pair.bearing_j * pair.bearing_i.transpose();
-  const Eigen::JacobiSVD<Eigen::Matrix3d> svd(sum, Eigen::ComputeFullU | Eigen::ComputeFullV);
-  if (!sum.allFinite() || svd.singularValues()[1] < 1e-12 * svd.singularValues()[0])
-    return std::nullopt;
-  Eigen::Matrix3d U = svd.matrixU();
-  if (U.determinant() * svd.matrixV().determinant() < 0.0) U.col(2) = -U.col(2);
-  return Rotation(Eigen::Quaterniond(Eigen::Matrix3d(U * svd.matrixV().transpose())));
 }
 
 }  // namespace rotslam

@@ -1,8 +1,5 @@
 #pragma once
 
-#include <optional>
-#include <span>
-
 #include <Eigen/Core>
 
 #include "rotodom/relative_rotation/bearing_pair.h"
@@ -10,6 +7,9 @@
 
 namespace rotslam {
 
+/// The method of the paper that rotslam started from, to compare with; the program itself minimises
+/// Sampson distances over rotation and direction.
+///
 /// Sums over bearing pairs that hold all the normal epipolar constraint needs to know about them,
 /// so that the cost of a solver iteration does not depend on their number.
 ///
@@ -35,17 +35,11 @@ struct NormalEpipolarMinimum {
 /// on the rotation, the translation direction projected out.
 /// @param start_j_from_i  the minimum found is the one this rotation descends to.
 /// Error:   truth to 1e-9 rad on clean pairs with a baseline (relative rotation tests).
-/// Source:  Kneip & Lynen, Direct Optimization of Frame-to-Frame Rotation, ICCV 2013; ours iterates
-/// with the
+/// Source:  Kneip & Lynen, Direct Optimization of Frame-to-Frame Rotation, ICCV 2013; with the
 ///          Gauss-Newton Hessian of sum (t . n)^2 with t eliminated (Kaufman's variable
 ///          projection).
-NormalEpipolarMinimum MinimizeNormalEpipolar(const NormalEpipolarSums& sums,
+NormalEpipolarMinimum MinimiseNormalEpipolar(const NormalEpipolarSums& sums,
                                              const Rotation& start_j_from_i,
                                              int max_iterations);
-
-/// Rotation that best aligns the pairs' bearings, R f_i ~ f_j (least squares).
-/// @return  nullopt for fewer than two pairs or bearings that are all parallel.
-/// Source:  Kabsch/Wahba by singular value decomposition.
-std::optional<Rotation> AlignBearings(std::span<const BearingPair> pairs);
 
 }  // namespace rotslam
