@@ -31,11 +31,13 @@ class MapViewsTest : public testing::Test {
     }
   }
 
-  MapViews Read(const std::string& path,
-                const SequenceOptions& options,
-                const std::set<FrameId>& frames) {
+  MapViews Read(const SequenceOptions& options, const std::set<FrameId>& frames) {
+    SequenceSource images(folder_.path(), options);
+    return Read(images, frames);
+  }
+
+  MapViews Read(ImageProvider& images, const std::set<FrameId>& frames) {
     problems_.clear();
-    SequenceSource images(path, options);
     return ReadMapViews(
         images, frames, [&](const std::string& problem) { problems_.push_back(problem); });
   }
@@ -45,8 +47,7 @@ class MapViewsTest : public testing::Test {
 };
 
 TEST_F(MapViewsTest, AreTheImagesOfTheFramesAskedFor) {
-  const MapViews views =
-      Read(folder_.path().string(), {.first = 1, .stride = 2}, {FrameId{0}, FrameId{2}});
+  const MapViews views = Read({.first = 1, .stride = 2}, {FrameId{0}, FrameId{2}});
   EXPECT_THAT(problems_, IsEmpty());
   ASSERT_EQ(views.size(), 2U);
   EXPECT_EQ(views.at(FrameId{0}).image.at<std::uint8_t>(3, 4), 10);
@@ -55,15 +56,16 @@ TEST_F(MapViewsTest, AreTheImagesOfTheFramesAskedFor) {
 }
 
 TEST_F(MapViewsTest, SayWhatCannotBeReadAgain) {
-  const std::string path = folder_.path().string();
+  SequenceSource images(folder_.path(), {});
   fs::resize_file(folder_.path() / "3.png", 10);
   fs::resize_file(folder_.path() / "4.png", 0);
-  EXPECT_EQ(Read(path, {}, {FrameId{2}, FrameId{3}, FrameId{4}, FrameId{5}}).size(), 2U);
+  EXPECT_EQ(Read(images, {FrameId{2}, FrameId{3}, FrameId{4}, FrameId{5}}).size(), 2U);
   EXPECT_THAT(problems_, ElementsAre(HasSubstr("3.png"), HasSubstr("4.png")));
-  EXPECT_EQ(Read(path, {}, {FrameId{2}, FrameId{9}}).size(), 1U);
+  EXPECT_EQ(Read(images, {FrameId{2}, FrameId{9}}).size(), 1U);
   EXPECT_THAT(problems_, ElementsAre(HasSubstr("frame 9")));
-  EXPECT_TRUE(Read(path + "/nowhere", {}, {FrameId{2}}).empty());
-  EXPECT_THAT(problems_, ElementsAre(HasSubstr("nowhere")));
+  fs::remove_all(folder_.path());
+  EXPECT_TRUE(Read(images, {FrameId{2}}).empty());
+  EXPECT_THAT(problems_, ElementsAre(HasSubstr("no such file")));
 }
 
 // A camera that walks and turns past points, every other frame in the map.
