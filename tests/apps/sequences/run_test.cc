@@ -327,7 +327,7 @@ TEST_F(RunCommand, GimbalStandsWhileItOnlyRotates) {
   EXPECT_NE(lines.front().find("whose scale nothing measures"), std::string::npos);
   EXPECT_THAT(Said("gimbal"),
               HasSubstr("of the map from frame " + std::to_string(turns[0].last + 1) + " on"));
-  EXPECT_THAT(Said("gimbal"), HasSubstr(" 1 pure-rotation stretch, "));
+  EXPECT_THAT(Said("gimbal"), HasSubstr(" 1 pure-rotation segment, "));
   lines.erase(lines.begin());
   const auto position_text = [&](int frame) {
     std::istringstream words(lines[frame]);
