@@ -1,12 +1,9 @@
-#include "rotodom/sequence/layout.h"
+#include "rotodom/sequence/sequence_form.h"
 
 #include <algorithm>
-#include <string_view>
 #include <system_error>
 
 #include "rotodom/sequence/image_list.h"
-#include "rotodom/sequence/sequence_form.h"
-#include "rotodom/sequence/times.h"
 #include "rotodom/types/text_file.h"
 
 namespace rotslam {
@@ -97,46 +94,6 @@ Layout FindLayout(const fs::path& path, const SequenceOptions& options) {
   layout.form = form.name;
   if (!layout.times_are_made_up) NoteGaps(layout);
   return layout;
-}
-
-InputReference ParseInputReference(const fs::path& path) {
-  std::error_code error;
-  if (fs::exists(path, error)) return {path, {}};
-  const std::string text = path.string();
-  for (std::size_t colon = text.find(':'); colon != std::string::npos;
-       colon = text.find(':', colon + 1)) {
-    const fs::path file = text.substr(0, colon);
-    if (fs::exists(file, error)) return {file, text.substr(colon + 1)};
-  }
-  return {path, {}};
-}
-
-bool NaturalLess(const std::string& a, const std::string& b) {
-  const auto is_digit = [](char c) { return c >= '0' && c <= '9'; };
-  std::size_t i = 0;
-  std::size_t j = 0;
-  while (i < a.size() && j < b.size()) {
-    if (!is_digit(a[i]) || !is_digit(b[j])) {
-      if (a[i] != b[j]) return a[i] < b[j];
-      ++i;
-      ++j;
-      continue;
-    }
-    const auto run = [&](const std::string& text, std::size_t& from) {
-      while (from < text.size() && text[from] == '0') ++from;
-      const std::size_t begin = from;
-      while (from < text.size() && is_digit(text[from])) ++from;
-      return std::string_view(text).substr(begin, from - begin);
-    };
-    const std::string_view number_a = run(a, i);
-    const std::string_view number_b = run(b, j);
-    if (number_a.size() != number_b.size()) return number_a.size() < number_b.size();
-    if (number_a != number_b) return number_a < number_b;
-  }
-  const std::size_t rest_a = a.size() - i;
-  const std::size_t rest_b = b.size() - j;
-  if (rest_a != rest_b) return rest_a < rest_b;
-  return a < b;  // equal but for leading zeros
 }
 
 }  // namespace rotslam
