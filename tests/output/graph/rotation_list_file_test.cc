@@ -1,4 +1,4 @@
-#include "output/graph/rotation_list.h"
+#include "output/graph/rotation_list_file.h"
 
 #include <cmath>
 #include <map>
