@@ -1,4 +1,4 @@
-#include "apps/cli/command.h"
+#include "apps/cli/terminal/common_flags.h"
 
 #include <algorithm>
 #include <thread>
