@@ -1,4 +1,4 @@
-#include "ba/loss.h"
+#include "ba/cost/loss.h"
 
 #include <cmath>
 

@@ -5,7 +5,9 @@
 
 #include <Eigen/Core>
 
-#include "ba/bundle_adjustment.h"
+#include "ba/types/bundle_options.h"
+#include "ba/types/bundle_problem.h"
+#include "rotodom/camera/camera.h"
 #include "rotodom/types/rotation.h"
 #include "rotodom/types/track.h"
 

@@ -1,4 +1,4 @@
-#include "ba/marginal_covariance.h"
+#include "ba/covariance/marginal_covariance.h"
 
 #include <deque>
 
@@ -7,7 +7,7 @@
 #include <ceres/loss_function.h>
 #include <gtest/gtest.h>
 
-#include "ba/reprojection_cost.h"
+#include "ba/cost/reprojection_cost.h"
 #include "tests/ba/ba_scene.h"
 
 namespace rotslam {

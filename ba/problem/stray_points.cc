@@ -1,4 +1,4 @@
-#include "ba/stray_points.h"
+#include "ba/problem/stray_points.h"
 
 #include <optional>
 

@@ -1,10 +1,10 @@
-#include "ba/stray_points.h"
+#include "ba/problem/stray_points.h"
 
 #include <algorithm>
 
 #include <gtest/gtest.h>
 
-#include "ba/classification.h"
+#include "ba/outliers/classification.h"
 #include "tests/ba/ba_scene.h"
 
 namespace rotslam {

@@ -1,4 +1,4 @@
-#include "ba/classification.h"
+#include "ba/outliers/classification.h"
 
 #include <algorithm>
 #include <array>
@@ -10,8 +10,8 @@
 
 #include <Eigen/Cholesky>
 
-#include "ba/loss.h"
-#include "ba/reprojection_cost.h"
+#include "ba/cost/loss.h"
+#include "ba/cost/reprojection_cost.h"
 #include "rotodom/types/parallel.h"
 #include "rotodom/types/triangulation.h"
 

@@ -1,4 +1,4 @@
-#include "ba/lens.h"
+#include "ba/cost/lens.h"
 
 #include <cmath>
 

@@ -1,4 +1,4 @@
-#include "ba/bundle_state.h"
+#include "ba/problem/bundle_state.h"
 
 #include <cmath>
 #include <map>

@@ -1,4 +1,4 @@
-#include "ba/marginal_covariance.h"
+#include "ba/covariance/marginal_covariance.h"
 
 #include <map>
 

@@ -1,4 +1,4 @@
-#include "ba/classification.h"
+#include "ba/outliers/classification.h"
 
 #include <algorithm>
 

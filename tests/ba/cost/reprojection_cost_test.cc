@@ -1,10 +1,10 @@
-#include "ba/reprojection_cost.h"
+#include "ba/cost/reprojection_cost.h"
 
 #include <ceres/autodiff_cost_function.h>
 #include <ceres/rotation.h>
 #include <gtest/gtest.h>
 
-#include "ba/lens.h"
+#include "ba/cost/lens.h"
 #include "rotodom/types/rotation.h"
 #include "tests/ba/ba_scene.h"
 

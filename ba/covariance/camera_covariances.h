@@ -3,27 +3,14 @@
 #include <optional>
 #include <vector>
 
-#include <ceres/solver.h>
+#include <Eigen/Core>
 
-#include "ba/bundle_state.h"
+#include "ba/problem/bundle_state.h"
+#include "ba/types/bundle_options.h"
+#include "ba/types/bundle_result.h"
+#include "rotodom/camera/camera.h"
 
 namespace rotslam {
-
-struct MinimisationResult {
-  BundleRoundSummary counts;  // frames, points, directions and observations; no costs
-  ceres::Solver::Summary solver;
-};
-
-/// Moves poses, points, directions and, where asked, the lens of `state` to a minimum of the used
-/// observations' robust cost.
-/// @param calibrated   the camera as it was given: what the lens is held to.
-/// @param refine_lens  as far as `options.lens` lets it.
-/// @return  nullopt, and the state as it was, when no frame that may move sees a point.
-std::optional<MinimisationResult> Minimise(const Camera& calibrated,
-                                           const BundleRound& round,
-                                           bool refine_lens,
-                                           const BundleOptions& options,
-                                           BundleState& state);
 
 /// How well a minimum is known where nothing outside the state is: see BundleResult.
 struct CameraCovariances {

@@ -1,11 +1,11 @@
-#include "ba/reprojection_cost.h"
+#include "ba/cost/reprojection_cost.h"
 
 #include <algorithm>
 #include <cmath>
 
 #include <Eigen/Geometry>
 
-#include "ba/loss.h"
+#include "ba/cost/loss.h"
 
 namespace rotslam {
 namespace {

@@ -1,6 +1,8 @@
 #pragma once
 
-#include "ba/bundle_state.h"
+#include "ba/problem/bundle_state.h"
+#include "ba/types/bundle_options.h"
+#include "ba/types/bundle_result.h"
 
 namespace rotslam {
 

@@ -5,7 +5,7 @@
 #include <Eigen/Core>
 #include <ceres/cost_function.h>
 
-#include "ba/lens.h"
+#include "ba/cost/lens.h"
 #include "rotodom/camera/camera.h"
 #include "rotodom/types/rotation.h"
 

@@ -1,4 +1,4 @@
-#include "ba/bundle_options.h"
+#include "ba/types/bundle_options.h"
 
 #include "rotodom/types/options.h"
 

@@ -5,7 +5,7 @@
 #include <Eigen/Core>
 #include <ceres/loss_function.h>
 
-#include "ba/bundle_options.h"
+#include "ba/types/bundle_options.h"
 
 namespace rotslam {
 

@@ -5,8 +5,8 @@
 
 #include <Eigen/Core>
 
-#include "ba/bundle_state.h"
-#include "ba/reprojection_cost.h"
+#include "ba/cost/reprojection_cost.h"
+#include "ba/problem/bundle_state.h"
 #include "rotodom/types/triangulation.h"
 
 namespace rotslam {
