@@ -59,7 +59,7 @@ class AdjustmentProblem {
   /// @param calibrated   the camera as it was given: what the lens is held to.
   /// @param round        its loss, and whether rotations move.
   /// @param refine_lens  as far as `options.lens` lets it.
-  /// All but `round` must outlive this.
+  /// `calibrated` and `state` must outlive this.
   AdjustmentProblem(const Camera& calibrated,
                     const BundleRound& round,
                     bool refine_lens,
@@ -110,5 +110,17 @@ class AdjustmentProblem {
   // One piece for all: they come and go together.
   std::pmr::monotonic_buffer_resource memory_of_costs_;
   std::pmr::deque<ReprojectionCost> costs_{&memory_of_costs_};
+  std::unique_ptr<LensPriorCost> lens_prior_;
+  std::unique_ptr<ScaleAnchorCost> anchor_;
+  CameraBlocks cameras_;
+  StrayPoints strays_;
+  Followers followers_;
+  ceres::Problem problem_;
+  std::vector<bool> frame_used_;
+  std::vector<bool> center_used_;
+  std::shared_ptr<ceres::ParameterBlockOrdering> ordering_;
+  bool moving_ = false;
+  BundleRoundSummary counts_;
+};
 
 }  // namespace rotslam
