@@ -7,10 +7,11 @@
 #include <numeric>
 #include <utility>
 
-#include "ba/bundle_state.h"
-#include "ba/classification.h"
-#include "ba/lens.h"
-#include "ba/minimisation.h"
+#include "ba/cost/lens.h"
+#include "ba/covariance/camera_covariances.h"
+#include "ba/outliers/classification.h"
+#include "ba/problem/bundle_state.h"
+#include "ba/solver/minimisation.h"
 #include "rotodom/types/stopwatch.h"
 #include "rotodom/types/triangulation.h"
 
@@ -316,22 +317,6 @@ void TakeResult(const BundleProblem& problem, const BundleState& state, BundleRe
 }
 
 }  // namespace
-
-const char* Name(BundleStatus status) {
-  switch (status) {
-    case BundleStatus::kNotRun:
-      return "not run";
-    case BundleStatus::kConverged:
-      return "converged";
-    case BundleStatus::kIterationLimit:
-      return "iteration limit";
-    case BundleStatus::kTooLittleData:
-      return "too little data";
-    case BundleStatus::kSolverFailed:
-      return "solver failed";
-  }
-  return "unknown";
-}
 
 BundleResult RefineBundle(const BundleProblem& problem,
                           const BundleOptions& options,

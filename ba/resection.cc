@@ -7,7 +7,7 @@
 
 #include <Eigen/Dense>
 
-#include "ba/reprojection_cost.h"
+#include "ba/cost/reprojection_cost.h"
 #include "rotodom/types/median.h"
 #include "rotodom/types/options.h"
 #include "rotodom/types/track.h"

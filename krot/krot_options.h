@@ -4,7 +4,7 @@
 #include <optional>
 #include <string>
 
-#include "krot/bracket/bisection.h"
+#include "krot/bracket/bisection_options.h"
 #include "krot/initialisation/robust_start.h"
 #include "rotodom/camera/camera.h"
 

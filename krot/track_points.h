@@ -3,8 +3,11 @@
 #include <optional>
 #include <vector>
 
-#include "krot/known_rotation.h"
 #include "krot/krot_options.h"
+#include "krot/krot_solution.h"
+#include "rotodom/camera/camera.h"
+#include "rotodom/types/maps.h"
+#include "rotodom/types/track.h"
 
 namespace rotslam {
 

@@ -12,7 +12,7 @@
 #include "output/files/option_list.h"
 #include "output/tables/summary.h"
 #include "output/trajectory/trajectory.h"
-#include "rotodom/sequence/layout.h"
+#include "rotodom/sequence/sequence_form.h"
 
 namespace rotslam {
 namespace {

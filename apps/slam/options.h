@@ -5,7 +5,7 @@
 #include <string>
 
 #include "apps/slam/map/cloud_outliers.h"
-#include "apps/slam/map_correction/relocalisation.h"
+#include "apps/slam/map_correction/relocalisation_options.h"
 #include "ba/bundle_adjustment.h"
 #include "ba/resection.h"
 #include "krot/known_rotation.h"

@@ -1,6 +1,7 @@
 #pragma once
 
-#include "krot/bracket/bisection.h"
+#include "krot/bracket/bisection_options.h"
+#include "krot/structure/minimax_problem.h"
 
 namespace rotslam {
 

@@ -6,6 +6,8 @@
 #include <utility>
 #include <vector>
 
+#include <Eigen/Geometry>
+
 #include "krot/structure/structure_system.h"
 
 namespace rotslam {

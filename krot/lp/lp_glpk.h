@@ -1,6 +1,6 @@
 #pragma once
 
-#include "krot/lp/lp.h"
+#include "krot/lp/linear_program.h"
 
 namespace rotslam {
 

@@ -7,7 +7,7 @@
 #include <string>
 #include <vector>
 
-#include "output/trajectory/trajectory.h"
+#include "output/trajectory/trajectory_file.h"
 #include "rotodom/types/text_file.h"
 
 namespace rotslam {

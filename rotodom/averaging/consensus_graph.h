@@ -5,7 +5,7 @@
 
 #include <Eigen/Geometry>
 
-#include "rotodom/averaging/consensus_start.h"
+#include "rotodom/averaging/consensus_problem.h"
 
 namespace rotslam {
 

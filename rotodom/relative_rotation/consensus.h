@@ -4,7 +4,7 @@
 #include <vector>
 
 #include "rotodom/relative_rotation/pair_arrays.h"
-#include "rotodom/relative_rotation/relative_rotation.h"
+#include "rotodom/relative_rotation/relative_rotation_options.h"
 
 namespace rotslam {
 

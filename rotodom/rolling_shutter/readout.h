@@ -2,23 +2,14 @@
 
 #include <map>
 #include <optional>
-#include <vector>
-
-#include <Eigen/Core>
 
 #include "rotodom/camera/camera.h"
 #include "rotodom/relative_rotation/relative_rotation.h"
+#include "rotodom/rolling_shutter/seen_points.h"
 #include "rotodom/types/maps.h"
 #include "rotodom/types/view_graph.h"
 
 namespace rotslam {
-
-/// A frame's points where they were seen, no rolling-shutter correction.
-struct SeenPoints {
-  double timestamp_s = 0.0;
-  std::vector<TrackId> tracks;  // ascending
-  std::vector<Eigen::Vector2d> keypoints_px;
-};
 
 /// How a camera seems to read out its sensor; readout_s 0 for a global shutter.
 struct ReadoutEstimate {

@@ -7,9 +7,12 @@
 
 #include <Eigen/Core>
 
+#include "rotodom/camera/camera.h"
 #include "rotodom/relative_rotation/bearing_pair.h"
-#include "rotodom/rolling_shutter/readout.h"
 #include "rotodom/rolling_shutter/rolling_shutter.h"
+#include "rotodom/rolling_shutter/seen_points.h"
+#include "rotodom/types/maps.h"
+#include "rotodom/types/view_graph.h"
 
 namespace rotslam {
 

@@ -2,7 +2,7 @@
 
 #include <vector>
 
-#include "rotodom/sequence/image_file.h"
+#include "rotodom/sequence/decoded_image.h"
 
 namespace rotslam {
 

@@ -7,13 +7,9 @@
 
 #include <opencv2/core/mat.hpp>
 
-namespace rotslam {
+#include "rotodom/sequence/decoded_image.h"
 
-/// An image, or an empty one, and why.
-struct DecodedImage {
-  cv::Mat image;
-  std::string problem;  // in one line; empty when the image is not
-};
+namespace rotslam {
 
 /// How pixels of more than 8 bits become 8 bits, the same for all images of a sequence.
 struct PixelScale {

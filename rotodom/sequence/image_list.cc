@@ -26,6 +26,18 @@ bool IsFile(const fs::path& path) {
   return fs::is_regular_file(path, ignored);
 }
 
+InputReference ParseInputReference(const fs::path& path) {
+  std::error_code error;
+  if (fs::exists(path, error)) return {path, {}};
+  const std::string text = path.string();
+  for (std::size_t colon = text.find(':'); colon != std::string::npos;
+       colon = text.find(':', colon + 1)) {
+    const fs::path file = text.substr(0, colon);
+    if (fs::exists(file, error)) return {file, text.substr(colon + 1)};
+  }
+  return {path, {}};
+}
+
 std::string Lower(std::string_view text) {
   std::string lower(text);
   std::transform(lower.begin(), lower.end(), lower.begin(), [](unsigned char c) {
@@ -53,6 +65,34 @@ bool IsImageName(const fs::path& file) {
   const std::string extension = LowerExtension(file);
   return std::find(kExtensions.begin(), kExtensions.end(), extension) != kExtensions.end() &&
          file.filename().string().front() != '.';
+}
+
+bool NaturalLess(const std::string& a, const std::string& b) {
+  const auto is_digit = [](char c) { return c >= '0' && c <= '9'; };
+  std::size_t i = 0;
+  std::size_t j = 0;
+  while (i < a.size() && j < b.size()) {
+    if (!is_digit(a[i]) || !is_digit(b[j])) {
+      if (a[i] != b[j]) return a[i] < b[j];
+      ++i;
+      ++j;
+      continue;
+    }
+    const auto run = [&](const std::string& text, std::size_t& from) {
+      while (from < text.size() && text[from] == '0') ++from;
+      const std::size_t begin = from;
+      while (from < text.size() && is_digit(text[from])) ++from;
+      return std::string_view(text).substr(begin, from - begin);
+    };
+    const std::string_view number_a = run(a, i);
+    const std::string_view number_b = run(b, j);
+    if (number_a.size() != number_b.size()) return number_a.size() < number_b.size();
+    if (number_a != number_b) return number_a < number_b;
+  }
+  const std::size_t rest_a = a.size() - i;
+  const std::size_t rest_b = b.size() - j;
+  if (rest_a != rest_b) return rest_a < rest_b;
+  return a < b;  // equal but for leading zeros
 }
 
 std::vector<fs::path> ImagesIn(const fs::path& folder) {

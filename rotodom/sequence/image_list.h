@@ -10,7 +10,6 @@
 #include <vector>
 
 #include "rotodom/camera/read_camera.h"
-#include "rotodom/sequence/layout.h"
 
 namespace rotslam {
 
@@ -18,6 +17,14 @@ namespace rotslam {
 
 bool IsFolder(const std::filesystem::path& path);
 bool IsFile(const std::filesystem::path& path);
+
+/// A file or folder and, after a colon, a part of it: "walk.bag:/cam0/image_raw". A path that
+/// exists as it stands has no part, nor has one none of whose beginnings exists.
+struct InputReference {
+  std::filesystem::path file;
+  std::string part;
+};
+InputReference ParseInputReference(const std::filesystem::path& path);
 
 /// `text` with small letters instead of capital ones, as far as it is ASCII.
 std::string Lower(std::string_view text);
@@ -27,6 +34,9 @@ std::string LowerExtension(const std::filesystem::path& file);
 
 /// Is it called like an image that ReadImageFile reads?
 bool IsImageName(const std::filesystem::path& file);
+
+/// Order of names in which runs of digits count as numbers: frame2 < frame10.
+bool NaturalLess(const std::string& a, const std::string& b);
 
 /// The images of a folder, ordered by name as NaturalLess says. Throws std::runtime_error when the
 /// folder cannot be listed.

@@ -3,8 +3,8 @@
 #include <filesystem>
 #include <vector>
 
+#include "rotodom/sequence/frames.h"
 #include "rotodom/sequence/layout.h"
-#include "rotodom/sequence/sequence.h"
 
 namespace rotslam {
 

@@ -5,9 +5,9 @@
 #include <string>
 #include <vector>
 
+#include "rotodom/camera/camera.h"
 #include "rotodom/camera/read_camera.h"
 #include "rotodom/sequence/photometric.h"
-#include "rotodom/sequence/sequence.h"
 
 namespace rotslam {
 
@@ -33,20 +33,5 @@ struct Layout {
   std::optional<PhotometricFiles> photometric;             // takes the vignetting out of the images
   std::vector<std::string> notes;  // assumed, left out or ignored; one line each
 };
-
-/// Recognises a path as described at OpenSequence and lists its images; decodes none.
-/// Throws std::runtime_error, with path and reason in one line.
-Layout FindLayout(const std::filesystem::path& path, const SequenceOptions& options);
-
-/// A file or folder and, after a colon, a part of it: "walk.bag:/cam0/image_raw". A path that
-/// exists as it stands has no part, nor has one none of whose beginnings exists.
-struct InputReference {
-  std::filesystem::path file;
-  std::string part;
-};
-InputReference ParseInputReference(const std::filesystem::path& path);
-
-/// Order of names in which runs of digits count as numbers: frame2 < frame10.
-bool NaturalLess(const std::string& a, const std::string& b);
 
 }  // namespace rotslam

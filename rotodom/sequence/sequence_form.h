@@ -5,8 +5,8 @@
 #include <string>
 #include <vector>
 
+#include "rotodom/sequence/frames.h"
 #include "rotodom/sequence/layout.h"
-#include "rotodom/sequence/sequence.h"
 
 namespace rotslam {
 
@@ -37,5 +37,9 @@ bool IsSequence(const std::filesystem::path& path);
 /// The form that reads `path`. Throws std::runtime_error, with path and reason in one line, when
 /// nothing is there or no form recognises it.
 const SequenceForm& FindSequenceForm(const std::filesystem::path& path);
+
+/// Recognises a path as described at OpenSequence and lists its images; decodes none.
+/// Throws std::runtime_error, with path and reason in one line.
+Layout FindLayout(const std::filesystem::path& path, const SequenceOptions& options);
 
 }  // namespace rotslam

@@ -4,7 +4,7 @@
 #include "output/export/known_rotation_file.h"
 #include "output/files/journal.h"
 #include "output/graph/g2o.h"
-#include "output/graph/rotation_list.h"
+#include "output/graph/rotation_list_file.h"
 #include "output/trajectory/metrics.h"
 #include "output/trajectory/orientation_file.h"
 #include "output/trajectory/trajectory.h"

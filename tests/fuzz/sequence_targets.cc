@@ -4,8 +4,8 @@
 #include <limits>
 #include <stdexcept>
 
-#include "rotodom/sequence/layout.h"
 #include "rotodom/sequence/sequence.h"
+#include "rotodom/sequence/sequence_form.h"
 #include "rotodom/sequence/times.h"
 #include "tests/fuzz/fuzz_target.h"
 

@@ -9,7 +9,7 @@
 
 #include "apps/cli/command.h"
 #include "apps/cli/input/config.h"
-#include "output/graph/rotation_list.h"
+#include "output/graph/rotation_list_file.h"
 #include "rotodom/averaging/certificate.h"
 #include "rotodom/averaging/global_averaging.h"
 #include "rotodom/types/stopwatch.h"

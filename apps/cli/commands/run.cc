@@ -5,6 +5,7 @@
 
 #include "apps/cli/command.h"
 #include "apps/cli/commands/track_input.h"
+#include "apps/cli/input/open_input.h"
 #include "apps/cli/input/run_options.h"
 #include "apps/cli/run_directory/checkpoint.h"
 #include "apps/cli/run_directory/run_directory.h"

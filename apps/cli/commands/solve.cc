@@ -20,7 +20,7 @@
 #include "apps/slam/map/refinement.h"
 #include "output/export/known_rotation_file.h"
 #include "output/files/atomic_file.h"
-#include "output/graph/rotation_list.h"
+#include "output/graph/rotation_list_file.h"
 #include "output/map/ply.h"
 #include "output/trajectory/trajectory.h"
 #include "rotodom/averaging/global_averaging.h"

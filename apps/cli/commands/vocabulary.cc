@@ -17,7 +17,7 @@
 #include "rotodom/loop/training.h"
 #include "rotodom/loop/vocabulary_file.h"
 #include "rotodom/sequence/image_file.h"
-#include "rotodom/sequence/layout.h"
+#include "rotodom/sequence/sequence_form.h"
 #include "rotodom/types/parallel.h"
 
 namespace rotslam {

@@ -8,7 +8,7 @@
 #include <libexif/exif-data.h>
 
 #include "apps/slam/focal_length.h"
-#include "rotodom/sequence/layout.h"
+#include "rotodom/sequence/sequence_form.h"
 
 namespace rotslam {
 namespace {

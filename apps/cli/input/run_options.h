@@ -3,8 +3,8 @@
 #include <optional>
 #include <string>
 
-#include "apps/cli/command.h"
 #include "apps/cli/input/input.h"
+#include "apps/cli/terminal/common_flags.h"
 #include "apps/slam/options.h"
 #include "rotodom/sequence/sequence.h"
 

@@ -8,7 +8,6 @@
 #include <utility>
 #include <vector>
 
-#include "apps/cli/command.h"
 #include "apps/cli/input/input.h"
 #include "apps/cli/input/run_options.h"
 #include "apps/cli/terminal/progress.h"

@@ -2,7 +2,7 @@
 
 #include <filesystem>
 
-#include "apps/cli/command.h"
+#include "apps/cli/terminal/common_flags.h"
 #include "apps/cli/terminal/progress.h"
 
 namespace rotslam {

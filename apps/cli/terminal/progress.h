@@ -8,7 +8,7 @@
 #include <thread>
 #include <vector>
 
-#include "apps/cli/command.h"
+#include "apps/cli/terminal/common_flags.h"
 
 namespace spdlog {
 class logger;

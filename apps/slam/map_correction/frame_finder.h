@@ -6,8 +6,12 @@
 #include <utility>
 #include <vector>
 
-#include "apps/slam/map_correction/relocalisation.h"
+#include "apps/slam/map_correction/lookalike.h"
+#include "apps/slam/map_correction/place_matches.h"
+#include "apps/slam/map_correction/relocalisation_options.h"
 #include "ba/resection.h"
+#include "rotodom/camera/camera.h"
+#include "rotodom/types/reconstruction.h"
 #include "rotodom/types/similarity.h"
 
 namespace rotslam {

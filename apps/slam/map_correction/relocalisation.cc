@@ -3,11 +3,11 @@
 #include <algorithm>
 #include <functional>
 #include <iterator>
+#include <optional>
 #include <stdexcept>
 #include <utility>
 
 #include "apps/slam/map_correction/frame_finder.h"
-#include "rotodom/types/options.h"
 #include "rotodom/types/parallel.h"
 
 namespace rotslam {
@@ -263,13 +263,6 @@ void Append(const std::vector<std::pair<TrackId, Observation>>& more,
 }
 
 }  // namespace
-
-std::optional<std::string> RelocalisationOptions::Problem() const {
-  if (min_inliers < 4) return OutOfRange("min_inliers", min_inliers, "at least 4");
-  if (!(max_error_px > 0.0)) return OutOfRange("max_error_px", max_error_px, "positive");
-  if (!(min_gain_sigmas > 0.0)) return OutOfRange("min_gain_sigmas", min_gain_sigmas, "positive");
-  return std::nullopt;
-}
 
 std::vector<RelocalisedMap> Relocalise(const std::vector<const Reconstruction*>& maps,
                                        const std::vector<Track>& tracks,

@@ -2,8 +2,8 @@
 
 #include <memory>
 
+#include "rotodom/sequence/frames.h"
 #include "rotodom/sequence/layout.h"
-#include "rotodom/sequence/sequence.h"
 
 namespace rotslam {
 

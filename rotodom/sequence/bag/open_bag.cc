@@ -11,7 +11,6 @@
 
 #include "rotodom/sequence/bag/bag_reader.h"
 #include "rotodom/sequence/image_list.h"
-#include "rotodom/sequence/layout.h"
 
 namespace rotslam {
 namespace {

@@ -7,7 +7,6 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-#include "rotodom/sequence/layout.h"
 #include "rotodom/sequence/sequence_form.h"
 #include "tests/rotodom/sequence/scratch_folder.h"
 

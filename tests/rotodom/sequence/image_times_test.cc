@@ -8,6 +8,7 @@
 #include <gtest/gtest.h>
 
 #include "rotodom/sequence/image_list.h"
+#include "rotodom/sequence/sequence_form.h"
 #include "tests/rotodom/sequence/scratch_folder.h"
 
 namespace rotslam {

@@ -8,6 +8,8 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include "rotodom/sequence/image_list.h"
+#include "rotodom/sequence/sequence_form.h"
 #include "tests/rotodom/sequence/scratch_folder.h"
 
 namespace rotslam {

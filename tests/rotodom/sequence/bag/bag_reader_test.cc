@@ -7,7 +7,7 @@
 #include <gtest/gtest.h>
 #include <sqlite3.h>
 
-#include "rotodom/sequence/layout.h"
+#include "rotodom/sequence/image_list.h"
 #include "tests/rotodom/sequence/bag/bag_writer.h"
 #include "tests/rotodom/sequence/scratch_folder.h"
 

@@ -1,0 +1,29 @@
+#pragma once
+
+#include <optional>
+#include <vector>
+
+#include <Eigen/Core>
+
+#include "ba/problem/bundle_state.h"
+#include "ba/types/bundle_options.h"
+#include "ba/types/bundle_result.h"
+#include "rotodom/camera/camera.h"
+
+namespace rotslam {
+
+/// How well a minimum is known where nothing outside the state is: see BundleResult.
+struct CameraCovariances {
+  std::vector<std::optional<PoseCovariance>> poses;  // by frame of the state; nullopt: not in it
+  std::optional<Eigen::Matrix<double, 6, 6>> lens;   // of LensParameters
+};
+
+/// Covariances of the cameras at the minimum that `state` is; the arguments are Minimise's.
+/// @return  nullopt when the observations leave a camera open.
+std::optional<CameraCovariances> FindCovariances(const Camera& calibrated,
+                                                 const BundleRound& round,
+                                                 bool refine_lens,
+                                                 const BundleOptions& options,
+                                                 BundleState& state);
+
+}  // namespace rotslam
