@@ -62,8 +62,15 @@ TEST_F(MapViewsTest, SayWhatCannotBeReadAgain) {
   EXPECT_THAT(problems_, ElementsAre(HasSubstr("3.png"), HasSubstr("4.png")));
   EXPECT_EQ(Read(path, {}, {FrameId{2}, FrameId{9}}).size(), 1U);
   EXPECT_THAT(problems_, ElementsAre(HasSubstr("frame 9")));
-  EXPECT_TRUE(Read(path + "/nowhere", {}, {FrameId{2}}).empty());
-  EXPECT_THAT(problems_, ElementsAre(HasSubstr("nowhere")));
+}
+
+TEST_F(MapViewsTest, SayThatAllImagesAreGone) {
+  SequenceSource images(folder_.path(), {});
+  for (int k = 0; k < 6; ++k) fs::remove(folder_.path() / (std::to_string(k) + ".png"));
+  const MapViews views = ReadMapViews(
+      images, {FrameId{2}}, [&](const std::string& problem) { problems_.push_back(problem); });
+  EXPECT_TRUE(views.empty());
+  EXPECT_THAT(problems_, ElementsAre(HasSubstr(folder_.path().string())));
 }
 
 // A camera that walks and turns past points, every other frame in the map.
