@@ -1,3 +1,4 @@
+#include <algorithm>
 #include <filesystem>
 #include <fstream>
 #include <map>
@@ -21,6 +22,30 @@ const std::set<Folder> kFrontEnd = {"rotodom/types",
                                     "rotodom/relative_rotation",
                                     "rotodom/rolling_shutter",
                                     "rotodom/motion_blur"};
+// What applications call.
+const std::set<Folder> kLibraries = {"rotodom/types",
+                                     "rotodom/camera",
+                                     "rotodom/sequence",
+                                     "rotodom/features",
+                                     "rotodom/matching",
+                                     "rotodom/relative_rotation",
+                                     "rotodom/rolling_shutter",
+                                     "rotodom/motion_blur",
+                                     "rotodom/tracking",
+                                     "rotodom/track_completion",
+                                     "rotodom/tracks",
+                                     "rotodom/view_graph",
+                                     "rotodom/averaging",
+                                     "rotodom",
+                                     "rotodom/loop",
+                                     "krot",
+                                     "ba"};
+const std::set<Folder> kOutput = {"output/files",
+                                  "output/trajectory",
+                                  "output/graph",
+                                  "output/map",
+                                  "output/tables",
+                                  "output/export"};
 const std::set<Folder> kOutputBase = {"rotodom/types", "rotodom/camera", "output/files"};
 
 std::set<Folder> With(std::set<Folder> folders, const std::set<Folder>& more) {
@@ -75,7 +100,21 @@ const std::map<Folder, std::set<Folder>> kAllowed = {
       "krot/interior_point",
       "krot/bracket",
       "krot/initialisation"}},
-    {"ba", {"rotodom/types", "rotodom/camera"}},
+    {"ba/types", {"rotodom/types", "rotodom/camera"}},
+    {"ba/cost", {"rotodom/types", "rotodom/camera", "ba/types"}},
+    {"ba/problem", {"rotodom/types", "rotodom/camera", "ba/types", "ba/cost"}},
+    {"ba/outliers", {"rotodom/types", "rotodom/camera", "ba/types", "ba/cost", "ba/problem"}},
+    {"ba/solver", {"rotodom/types", "rotodom/camera", "ba/types", "ba/cost", "ba/problem"}},
+    {"ba/covariance", {"rotodom/types", "rotodom/camera", "ba/types", "ba/cost", "ba/problem"}},
+    {"ba",
+     {"rotodom/types",
+      "rotodom/camera",
+      "ba/types",
+      "ba/cost",
+      "ba/problem",
+      "ba/outliers",
+      "ba/solver",
+      "ba/covariance"}},
     {"output/files", {"rotodom/types"}},
     {"output/trajectory", {"rotodom/types", "output/files"}},
     {"output/trajectory/forms", {"rotodom/types", "output/files", "output/trajectory"}},
@@ -84,73 +123,202 @@ const std::map<Folder, std::set<Folder>> kAllowed = {
     {"output/map", kOutputBase},
     {"output/tables", With(kOutputBase, {"output/trajectory"})},
     {"output/export", With(kOutputBase, {"output/trajectory", "output/map"})},
+    // The mapping library reads no files of ours, writes none and knows no command line.
+    {"apps/slam/map", kLibraries},
+    {"apps/slam/map_correction", With(kLibraries, {"apps/slam/map"})},
+    {"apps/slam", With(kLibraries, {"apps/slam/map", "apps/slam/map_correction"})},
+    {"apps/simulation", {"rotodom/types", "rotodom/camera"}},
+    {"apps/report", With(kOutput, {"rotodom/types", "rotodom/camera", "rotodom/sequence"})},
+    {"apps/cli/terminal", With(kLibraries, {"apps/slam", "apps/slam/map", "output/files"})},
+    {"apps/cli", {"apps/cli/terminal", "output/tables"}},
+    {"apps/cli/input", With(With(kLibraries, kOutput), {"apps/slam", "apps/cli/terminal"})},
+    {"apps/cli/run_directory",
+     With(With(kLibraries, kOutput),
+          {"apps/slam", "apps/cli", "apps/cli/terminal", "apps/cli/input"})},
+    {"apps/batch", With(With(kLibraries, kOutput), {"apps/report", "apps/cli/input"})},
+    {"apps/cli/commands",
+     With(With(kLibraries, kOutput),
+          {"apps/slam",
+           "apps/slam/map",
+           "apps/simulation",
+           "apps/report",
+           "apps/batch",
+           "apps/cli",
+           "apps/cli/terminal",
+           "apps/cli/input",
+           "apps/cli/run_directory"})},
+    {"apps/python", With(With(kLibraries, kOutput), {"apps/slam", "apps/cli/input"})},
 };
 
-// Folders at the top, which may include everything below them and which nothing below includes.
-const std::string kTop = "apps";
+// Examples use what is installed.
+const std::string kExamples = "apps/examples/";
+const std::set<Folder> kInstalled = With(With(kLibraries, kOutput), {"apps/slam"});
+
+// What a folder may include; null where nobody has decided it.
+const std::set<Folder>* AllowedFrom(const Folder& folder) {
+  if (folder.starts_with(kExamples)) return &kInstalled;
+  const auto allowed = kAllowed.find(folder);
+  return allowed == kAllowed.end() ? nullptr : &allowed->second;
+}
+
+// A room that nobody can take in at a glance is split: .h and .cc files, not those of rooms within.
+constexpr int kMaxFiles = 25;
 
 // These build and test without OpenCV.
 bool DoesWithoutOpenCv(const Folder& folder) {
   return folder == "rotodom/types" || folder.starts_with("rotodom/camera") ||
-         folder.starts_with("krot") || folder == "ba" || folder.starts_with("output");
+         folder.starts_with("krot") || folder.starts_with("ba") || folder.starts_with("output");
 }
 
+using File = std::filesystem::path;  // from the project's folder on
+
 struct Include {
-  Folder from;
-  std::string file;    // that has the line
+  File file;           // that has the line
   std::string target;  // as written, without quotes or brackets
   bool quoted = false;
+
+  Folder From() const { return file.parent_path().string(); }
 };
 
-bool IsTop(const Folder& folder) { return folder == kTop || folder.starts_with(kTop + "/"); }
+// All .h and .cc files of the program.
+std::vector<File> SourceFiles() {
+  const std::filesystem::path root = ROTSLAM_SOURCE_DIR;
+  std::vector<File> files;
+  for (const char* top : {"rotodom", "krot", "ba", "output", "apps"}) {
+    for (const auto& entry : std::filesystem::recursive_directory_iterator(root / top)) {
+      const std::string extension = entry.path().extension().string();
+      if (extension != ".h" && extension != ".cc") continue;
+      files.push_back(std::filesystem::relative(entry.path(), root));
+    }
+  }
+  std::sort(files.begin(), files.end());
+  return files;
+}
 
-std::vector<Include> IncludesOf(const std::filesystem::path& root, const std::string& top_folder) {
+std::vector<Include> IncludesOf(const File& file) {
   static const std::regex kPattern(R"re(^\s*#\s*include\s*(["<])([^">]+)[">])re");
   std::vector<Include> includes;
-  for (const auto& entry : std::filesystem::recursive_directory_iterator(root / top_folder)) {
-    const std::string extension = entry.path().extension().string();
-    if (extension != ".h" && extension != ".cc") continue;
-    const std::filesystem::path file = std::filesystem::relative(entry.path(), root);
-    std::ifstream stream(entry.path());
-    for (std::string line; std::getline(stream, line);) {
-      std::smatch match;
-      if (!std::regex_search(line, match, kPattern)) continue;
-      includes.push_back(
-          {file.parent_path().string(), file.string(), match[2].str(), match[1] == "\""});
-    }
+  std::ifstream stream(std::filesystem::path(ROTSLAM_SOURCE_DIR) / file);
+  for (std::string line; std::getline(stream, line);) {
+    std::smatch match;
+    if (!std::regex_search(line, match, kPattern)) continue;
+    includes.push_back({file, match[2].str(), match[1] == "\""});
   }
   return includes;
 }
 
 std::vector<Include> AllIncludes() {
   std::vector<Include> includes;
-  for (const char* folder : {"rotodom", "krot", "ba", "output", "apps"}) {
-    const std::vector<Include> more = IncludesOf(ROTSLAM_SOURCE_DIR, folder);
+  for (const File& file : SourceFiles()) {
+    const std::vector<Include> more = IncludesOf(file);
     includes.insert(includes.end(), more.begin(), more.end());
   }
   return includes;
+}
+
+// A header and its source, by their path without extension.
+using Module = std::string;
+
+Module ModuleOf(File file) { return file.replace_extension().string(); }
+
+// Which modules include which, as circles are looked for in it.
+class ModuleGraph {
+ public:
+  explicit ModuleGraph(const std::vector<Include>& includes) {
+    for (const Include& include : includes) {
+      if (!include.quoted) continue;
+      const Module from = ModuleOf(include.file);
+      const Module to = ModuleOf(include.target);
+      if (from != to) below_[from].insert(to);
+    }
+  }
+
+  // Each as "a -> b -> a"; none where there are none. Of circles that share modules one is enough.
+  std::vector<std::string> Circles() {
+    for (const auto& [module, below] : below_) Visit(module);
+    return circles_;
+  }
+
+ private:
+  void Visit(const Module& module) {
+    if (done_.contains(module)) return;
+    const auto begin = std::find(path_.begin(), path_.end(), module);
+    if (begin != path_.end()) {
+      std::string circle;
+      for (auto step = begin; step != path_.end(); ++step) circle += *step + " -> ";
+      circles_.push_back(circle + module);
+      return;
+    }
+    path_.push_back(module);
+    for (const Module& below : below_[module]) Visit(below);
+    path_.pop_back();
+    done_.insert(module);
+  }
+
+  std::map<Module, std::set<Module>> below_;
+  std::set<Module> done_;
+  std::vector<Module> path_;  // that is being followed
+  std::vector<std::string> circles_;
+};
+
+TEST(Architecture, KnowsEveryFolder) {
+  std::set<Folder> folders;
+  for (const File& file : SourceFiles()) folders.insert(file.parent_path().string());
+  for (const Folder& folder : folders) {
+    EXPECT_NE(AllowedFrom(folder), nullptr)
+        << folder << " is new: say in kAllowed what it may include";
+  }
+  for (const auto& [folder, allowed] : kAllowed) {
+    EXPECT_TRUE(folders.contains(folder)) << folder << " has gone: take it from kAllowed";
+  }
 }
 
 TEST(Architecture, HasNoNewArrowBetweenFolders) {
   int num_arrows = 0;
   for (const Include& include : AllIncludes()) {
     if (!include.quoted) continue;
+    const Folder from = include.From();
     const Folder to = std::filesystem::path(include.target).parent_path().string();
     EXPECT_FALSE(to.empty()) << include.file << " includes \"" << include.target
                              << "\": includes carry the folder";
-    if (to == include.from) continue;
+    if (to == from) continue;
     ++num_arrows;
-    if (IsTop(include.from)) continue;
-    const auto allowed = kAllowed.find(include.from);
-    const bool known = allowed != kAllowed.end() && allowed->second.contains(to);
-    EXPECT_TRUE(known) << include.file << " draws a new arrow: " << include.from << " -> " << to;
+    const std::set<Folder>* const allowed = AllowedFrom(from);
+    EXPECT_TRUE(allowed != nullptr && allowed->contains(to))
+        << include.file << " draws a new arrow: " << from << " -> " << to;
   }
   EXPECT_GT(num_arrows, 10) << "found no includes: is the source folder right?";
 }
 
+TEST(Architecture, HasNoCircleOfModules) {
+  for (const std::string& circle : ModuleGraph(AllIncludes()).Circles()) {
+    ADD_FAILURE() << "these include one another: " << circle;
+  }
+}
+
+TEST(Architecture, FindsCircles) {
+  const auto circles = ModuleGraph({{"krot/a.h", "krot/b.h", true},
+                                    {"krot/b.h", "ba/d.h", true},
+                                    {"krot/b.cc", "krot/b.h", true},
+                                    {"krot/b.cc", "krot/c.h", true},
+                                    {"krot/c.h", "krot/b.h", true},
+                                    {"krot/d.h", "krot/a.h", true}})
+                           .Circles();
+  ASSERT_EQ(circles.size(), 1U);
+  EXPECT_EQ(circles.front(), "krot/b -> krot/c -> krot/b");
+}
+
+TEST(Architecture, KeepsRoomsSmall) {
+  std::map<Folder, int> num_files;
+  for (const File& file : SourceFiles()) ++num_files[file.parent_path().string()];
+  for (const auto& [folder, count] : num_files) {
+    EXPECT_LE(count, kMaxFiles) << folder << " has too many files: split it";
+  }
+}
+
 TEST(Architecture, KeepsOpenCvInTheFrontEnd) {
   for (const Include& include : AllIncludes()) {
-    if (!DoesWithoutOpenCv(include.from)) continue;
+    if (!DoesWithoutOpenCv(include.From())) continue;
     EXPECT_FALSE(include.target.starts_with("opencv")) << include.file << " includes OpenCV";
   }
 }
