@@ -290,8 +290,8 @@ void RotationalOdometry::DetectNewFeatures(const cv::Mat& image, View& view) {
 void RotationalOdometry::CorrectRollingShutterOf(View& view,
                                                  const std::vector<const View*>& others) const {
   const auto time_s = [&](FrameId frame) { return timestamps_s_.at(frame); };
-  const BelievedMotion believed =
-      BelievedMotionAt(view.features.frame, cam_from_world_, time_s, camera_.readout_s);
+  const MotionEstimate believed =
+      EstimateMotionAt(view.features.frame, cam_from_world_, time_s, camera_.readout_s);
   view.features.shared_error_px = believed.TypicalErrorRad() * camera_.MeanFocal();
   CorrectRollingShutter(camera_, believed.motion, others, view);
 }
@@ -468,7 +468,8 @@ void RotationalOdometry::MeasureExposure() {
   double largest = 0.0;
   for (const std::shared_ptr<View>& view : recent_) {
     const auto other = turning(*view);
-    if (!other || !ExposureMeter::Tells(other->rate, newest->rate, camera_.MeanFocal())) continue;
+    if (!other || !ExposureMeter::IsInformative(other->rate, newest->rate, camera_.MeanFocal()))
+      continue;
     const double difference = std::abs(other->rate.norm() - newest->rate.norm());
     if (difference <= largest) continue;
     largest = difference;

@@ -9,7 +9,7 @@
 
 namespace rotslam {
 
-/// A rectangle of a drawing in which data have their place.
+/// A rectangle of a drawing that shows a range of data.
 class Axes {
  public:
   struct Box {
@@ -23,13 +23,14 @@ class Axes {
 
   /// Widens the range of data to hold this point; NaN leaves a coordinate out.
   void Include(const Eigen::Vector2d& point);
-  /// A little room around the data; with `equal_scale` a unit is as long in both directions.
+  /// Fixes the range with a margin around the data; with `equal_scale` a unit has the same length
+  /// in both directions.
   void Settle(bool equal_scale);
 
-  /// Grid, frame, numbers and names. Without `x_label` the lower numbers are left out, too.
+  /// Draws grid, frame, numbers and labels. Without `x_label` the numbers below are left out, too.
   void DrawFrame(const std::string& x_label, const std::string& y_label, Drawing& drawing) const;
   Eigen::Vector2d OnPage(const Eigen::Vector2d& point) const;
-  /// The parts of a line through data points that lie within the axes.
+  /// Draws the parts of a line through data points that are within the axes.
   void DrawLine(const std::vector<Eigen::Vector2d>& points,
                 const Stroke& stroke,
                 Drawing& drawing) const;

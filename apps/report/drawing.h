@@ -34,8 +34,8 @@ struct TextStyle {
   Color color;
 };
 
-/// Lines, areas and words on a white page, in points (1/72 inch) from its top left corner. The same
-/// shapes become an SVG, whose words stay words, and a PNG.
+/// Lines, areas and text on a white page, in points (1/72 inch) from its top left corner. Writes
+/// them as SVG, in which text remains text, and as PNG.
 class Drawing {
  public:
   Drawing(double width, double height) : width_(width), height_(height) {}
@@ -45,13 +45,13 @@ class Drawing {
 
   void AddLine(std::vector<Eigen::Vector2d> points, const Stroke& stroke);
   void AddArea(std::vector<Eigen::Vector2d> corners, const Color& color);
-  /// Small squares of side `size` around the points.
+  /// Adds small squares of side `size` around the points.
   void AddDots(std::vector<Eigen::Vector2d> points, double size, const Color& color);
-  /// @param baseline  where the words start, end or have their middle, on their base line.
+  /// @param baseline  start, end or middle of the text on its base line.
   void AddText(const Eigen::Vector2d& baseline, std::string text, const TextStyle& style);
 
   std::string Svg() const;
-  /// Through Cairo. Throws std::runtime_error when that fails.
+  /// Draws with Cairo. Throws std::runtime_error when that fails.
   std::string Png(double dots_per_inch) const;
 
  private:

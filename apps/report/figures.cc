@@ -26,7 +26,7 @@ constexpr double kPlotWidth = kWidth - kLeft - 12.0;
 constexpr double kNaN = std::numeric_limits<double>::quiet_NaN();
 
 constexpr Stroke kMeasured = {kBlue, 1.4};
-constexpr Stroke kLoose = {kBlue, 1.4, 2.5};
+constexpr Stroke kAssumedScale = {kBlue, 1.4, 2.5};
 
 struct LegendEntry {
   std::string text;
@@ -61,26 +61,26 @@ Eigen::Matrix3d LevelFromWorld(const Trajectory& poses) {
   return level_from_world;
 }
 
-bool IsHeld(const Segment& segment) { return segment.kind != "translating"; }
+bool IsPureRotation(const Segment& segment) { return segment.kind != "translating"; }
 
-bool IsLoose(const Segment& segment) { return segment.scale == "continuity"; }
+bool HasAssumedScale(const Segment& segment) { return segment.scale == "continuity"; }
 
-// The estimate's line, dashed where nothing measures the scale.
+// Draws the estimated path, dashed where the scale is not measured.
 void DrawEstimate(const RunData& run,
                   const std::vector<Eigen::Vector2d>& estimate,
                   const Axes& axes,
                   Drawing& drawing) {
-  std::vector<bool> is_loose(estimate.size(), false);
+  std::vector<bool> is_assumed(estimate.size(), false);
   for (const Segment& segment : run.segments) {
-    if (!IsLoose(segment)) continue;
+    if (!HasAssumedScale(segment)) continue;
     const int end = std::min(segment.last_frame + 1, static_cast<int>(estimate.size()));
-    for (int n = std::max(0, segment.first_frame); n < end; ++n) is_loose[n] = true;
+    for (int n = std::max(0, segment.first_frame); n < end; ++n) is_assumed[n] = true;
   }
   for (std::size_t first = 0; first + 1 < estimate.size();) {
     std::size_t last = first + 1;
-    while (last + 1 < estimate.size() && is_loose[last] == is_loose[first]) ++last;
+    while (last + 1 < estimate.size() && is_assumed[last] == is_assumed[first]) ++last;
     axes.DrawLine({estimate.begin() + first, estimate.begin() + last + 1},
-                  is_loose[first] ? kLoose : kMeasured,
+                  is_assumed[first] ? kAssumedScale : kMeasured,
                   drawing);
     first = last;
   }
@@ -125,8 +125,8 @@ std::vector<Eigen::Vector2d> Projected(const std::vector<Eigen::Vector3d>& point
   return projected;
 }
 
-// The path decides what is shown, and as much of the cloud around it as lies near.
-// @return  whether any of the cloud does.
+// The range of the axes is that of the path and a margin; points of the cloud outside are left out.
+// @return  whether any point of the cloud is drawn.
 bool DrawMap(const RunData& run,
              const Paths& paths,
              std::array<int, 2> axes_of_map,
@@ -152,12 +152,12 @@ bool DrawMap(const RunData& run,
   drawing.AddDots(std::move(dots), 0.7, kCloud);
   DrawEstimate(run, estimate, axes, drawing);
   axes.DrawLine(truth, {kTruth, 1.0, 3.5}, drawing);
-  std::vector<Eigen::Vector2d> held;
+  std::vector<Eigen::Vector2d> rotation_places;
   for (const Segment& segment : run.segments) {
-    if (!IsHeld(segment)) continue;
-    held.push_back(axes.OnPage(estimate[segment.first_frame]));
+    if (!IsPureRotation(segment)) continue;
+    rotation_places.push_back(axes.OnPage(estimate[segment.first_frame]));
   }
-  drawing.AddDots(std::move(held), 5.0, kOrange);
+  drawing.AddDots(std::move(rotation_places), 5.0, kOrange);
   return has_dots;
 }
 
@@ -177,12 +177,12 @@ Drawing TrajectoryFigure(const RunData& run) {
                                       Axes({kLeft, 384.0, kPlotWidth, 138.0}),
                                       drawing);
   std::vector<LegendEntry> legend = {{"estimate", kMeasured}};
-  if (std::any_of(run.segments.begin(), run.segments.end(), IsLoose)) {
-    legend.push_back({"scale assumed", kLoose});
+  if (std::any_of(run.segments.begin(), run.segments.end(), HasAssumedScale)) {
+    legend.push_back({"scale assumed", kAssumedScale});
   }
   if (!paths.truth.empty()) legend.push_back({"ground truth", {kTruth, 1.0, 3.5}});
-  if (std::any_of(run.segments.begin(), run.segments.end(), IsHeld)) {
-    legend.push_back({"turning or at rest", {kOrange, 5.0}});
+  if (std::any_of(run.segments.begin(), run.segments.end(), IsPureRotation)) {
+    legend.push_back({"rotating or at rest", {kOrange, 5.0}});
   }
   if (has_dots_above || has_dots_aside) legend.push_back({"points", {kCloud, 2.0}});
   DrawLegend(legend, drawing);

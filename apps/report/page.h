@@ -12,7 +12,7 @@
 
 namespace rotslam {
 
-/// What a report shows, and how large it may become.
+/// Contents and size of a report.
 struct ReportOptions {
   PageLimits limits;
   ThumbnailOptions thumbnails;
@@ -21,10 +21,11 @@ struct ReportOptions {
   std::size_t max_bytes = 15'000'000;
 };
 
-/// A page that shows all of a run and opens without network: styles, scripts and data are in it.
+/// A self-contained HTML page of a run: styles, scripts and data are in it, so that it opens
+/// without a network.
 std::string ReportPage(const RunData& run, const ReportOptions& options);
 
-/// `data` as it stands in the page: no name from the world ends the element that it is in.
+/// Serialises `data` for the page; the text cannot end the script element that contains it.
 std::string EmbeddedJson(const nlohmann::ordered_json& data);
 
 }  // namespace rotslam

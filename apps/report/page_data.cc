@@ -37,7 +37,7 @@ void Append(const Eigen::Vector3d& vector, std::vector<float>& values) {
   for (const double value : vector) values.push_back(static_cast<float>(value));
 }
 
-// So far apart are the things shown when there are `count` of them.
+// Step between the elements shown, so that at most `limit` of `count` are.
 int StepFor(std::size_t count, int limit) {
   return std::max(1, static_cast<int>((count + limit - 1) / limit));
 }
@@ -247,7 +247,7 @@ Json TruthJson(const RunData& run, int step) {
     const int n = truth.frames[k];
     if (n % step != 0) continue;
     frames.push_back(n);
-    // Unwrapping begins anew behind a gap: both curves shall stay on the same turn.
+    // Unwrapping restarts after a gap; multiples of 360 deg keep both curves together.
     Append(angles_deg[k] +
                360.0 * ((estimated_deg[n] - angles_deg[k]) / 360.0).array().round().matrix(),
            angle);
@@ -270,7 +270,7 @@ Json TruthJson(const RunData& run, int step) {
   return data;
 }
 
-// At most `limit` of the points, evenly over their order, in 1/65535 of the picture's size.
+// At most `limit` of the points at equal steps, in units of 1/65535 of the image size.
 std::vector<std::uint16_t> Packed(const std::vector<Eigen::Array2d>& places, int limit) {
   const int step = StepFor(places.size(), limit);
   std::vector<std::uint16_t> packed;
@@ -283,7 +283,7 @@ std::vector<std::uint16_t> Packed(const std::vector<Eigen::Array2d>& places, int
   return packed;
 }
 
-// Where the cloud's points lie in the pictures of these frames, as a share of width and height.
+// Image positions of the cloud's points in these frames, as shares of width and height.
 std::map<int, std::vector<Eigen::Array2d>> FeaturesIn(const std::vector<int>& frames,
                                                       const RunMap& map) {
   std::map<int, std::vector<Eigen::Array2d>> features;

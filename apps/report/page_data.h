@@ -10,7 +10,7 @@
 
 namespace rotslam {
 
-/// How much of a run goes into its report.
+/// Limits of the data in a report.
 struct PageLimits {
   // More points are thinned out evenly over the cloud's order.
   int max_points = 50000;
@@ -20,14 +20,14 @@ struct PageLimits {
   int max_features_per_frame = 400;
 };
 
-/// What the page shows, under the names by which its scripts ask for it. Arrays of numbers are
-/// {"type", "columns", "data"} with little-endian numbers in base64; all of them are finite,
-/// unknown standard deviations are -1.
+/// The data of the page, under the names that its scripts use. Arrays of numbers are {"type",
+/// "columns", "data"} with little-endian numbers in base64; all of them are finite, unknown
+/// standard deviations are -1.
 nlohmann::ordered_json PageData(const RunData& run,
                                 const Thumbnails& thumbnails,
                                 const PageLimits& limits);
 
-/// Binary data as text.
+/// Encodes binary data as base64.
 std::string Base64(std::string_view bytes);
 
 }  // namespace rotslam

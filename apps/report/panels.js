@@ -68,29 +68,29 @@ function buildHead() {
 
 function bestRotations() { return data.truth.trajectory || data.truth.rotations; }
 
-// What a reader must know before believing a picture.
+// Warnings and notes above the view: what limits the accuracy of the results shown.
 function buildNotes() {
   const note = (text) => $('notes').append(h('div', {class: 'note'}, text));
   const warn = (text) => $('notes').append(h('div', {class: 'note warning'}, text));
   if (!hasPositions) {
     note(summary.command === 'rotations' ?
       'Orientations only: rotslam rotations finds no positions. The view shows where the camera looked.' :
-      'There are no positions: the camera never leaves its place, or no map was found. The view shows where the camera looked.');
+      'There are no positions: the camera only rotates, or no map was found. The view shows where the camera looked.');
   }
-  if (summary.interrupted) note('The run was interrupted: this is what it had found by then.');
+  if (summary.interrupted) note('The run was interrupted: the results end there.');
   const calibration = summary.calibration || {};
   if (String(calibration.source).startsWith('focal_guess')) {
     warn(`No calibration: the focal length began as a guess of ${significant(calibration.guess_px, 5)} px ` +
-      `and is ${significant(calibration.refined_px, 5)} px now. Angles and shape are as wrong as it is; ` +
-      'a calibrated camera does better (rotslam calibrate).');
+      `and is ${significant(calibration.refined_px, 5)} px now. Angles and shape are as wrong as it is. ` +
+      'Calibrate the camera for better results (rotslam calibrate).');
   }
-  if (calibration.source === 'turning') {
-    warn(`The camera turns in place only if its focal length is ${significant(calibration.refined_px, 5)} px, ` +
-      `not ${significant(calibration.given_px, 5)} px as its calibration says; what is shown rests on that.`);
+  if (calibration.source === 'pure_rotation') {
+    warn(`The camera only rotates if its focal length is ${significant(calibration.refined_px, 5)} px, ` +
+      `not ${significant(calibration.given_px, 5)} px as its calibration says. The results use the first value.`);
   }
   if (summary.readout) {
-    note(`The shutter rolls: the images tell a readout of ${(1e3 * summary.readout.readout_s).toFixed(1)} ± ` +
-      `${(1e3 * summary.readout.sigma_s).toFixed(1)} ms from the ${summary.camera.readout_from}, which its calibration does not give.`);
+    note(`Rolling shutter: the readout time estimated from the images is ${(1e3 * summary.readout.readout_s).toFixed(1)} ± ` +
+      `${(1e3 * summary.readout.sigma_s).toFixed(1)} ms from the ${summary.camera.readout_from}; the calibration gives none.`);
   }
   if (counts.unreadable_frames) note(counted(counts.unreadable_frames, 'frame') + ' could not be read.');
   if (counts.frames_without_edge) {
@@ -98,7 +98,7 @@ function buildNotes() {
       ' no other frame; the orientation there is interpolated (red ticks below the curves).');
   }
   if (counts.breaks) {
-    note(counted(counts.breaks, 'time') + ' nothing matches what came before: the orientation across is extrapolated (red ticks).');
+    note(counted(counts.breaks, 'time') + ' a frame matches none before it: the orientation across the gap is a guess (red ticks).');
   }
   if (counts.interpolated_frames) {
     note(counted(counts.interpolated_frames, 'position') + (counts.interpolated_frames === 1 ? ' is' : ' are') +
@@ -106,12 +106,12 @@ function buildNotes() {
   }
   const allPoints = counts.points + counts.shallow_points + counts.cloud_outliers;
   if (hasPositions && allPoints > 0 && 2 * counts.points < allPoints) {
-    note(`The cloud holds ${whole(counts.points)} of ${whole(allPoints)} points: the camera has moved too little for more.`);
+    note(`The cloud holds ${whole(counts.points)} of ${whole(allPoints)} points: the camera has moved too little for more. Depth needs views from different places.`);
   }
   for (const segment of data.segments) {
     if (segment.scale !== 'continuity') continue;
-    note(`Frames ${segment.first} to ${segment.last}: nothing measures the scale of this part of the map; ` +
-      'what is seen is taken to be as far away as before it (dashed in the view).');
+    note(`Frames ${segment.first} to ${segment.last}: the scale of this part of the map is not measured. ` +
+      'It assumes that the scene stays as far away as before (dashed in the view).');
   }
   if (summary.krot && !['converged', 'not_run'].includes(summary.krot.status)) {
     note('Known rotation: ' + summary.krot.status + (summary.krot.message ? ', ' + summary.krot.message : ''));

@@ -78,7 +78,7 @@ void AddPositionsOfTruth(const std::vector<PosePair>& pairs, TruthData& truth) {
 }
 
 // The rotation between the two worlds with the least sum of squared chordal distances.
-Rotation BestTurn(const std::vector<PosePair>& pairs) {
+Rotation BestRotation(const std::vector<PosePair>& pairs) {
   Eigen::Matrix3d sum = Eigen::Matrix3d::Zero();
   for (const PosePair& pair : pairs) {
     sum += pair.estimate.world_from_cam.Matrix() *
@@ -110,7 +110,7 @@ TruthData CompareWith(const TruthSource& source,
   truth.notes = matched.notes;
   truth.rotations = ComputeMetrics(pairs, options);
   truth.frames = PlacesOf(pairs, orientations);
-  const Rotation estimate_from_truth = BestTurn(pairs);
+  const Rotation estimate_from_truth = BestRotation(pairs);
   truth.world_from_cam.reserve(pairs.size());
   for (const PosePair& pair : pairs) {
     truth.world_from_cam.push_back(estimate_from_truth * pair.ground_truth.world_from_cam);
@@ -153,7 +153,7 @@ RunData ReadRunData(const fs::path& run) {
   const auto is_there = [&](const char* name) { return fs::exists(run / name); };
   if (is_there("loops.csv")) data.loops = ReadLoopsCsv(run / "loops.csv");
   if (is_there("view_graph.g2o")) data.edges = ReadG2o(run / "view_graph.g2o").graph.edges();
-  // Whatever else lies there is then of an older run.
+  // Other files in the folder are then from an older run.
   if (data.summary.value("command", "") == "rotations" ||
       data.summary.value("interrupted", false)) {
     return data;

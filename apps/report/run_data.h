@@ -26,8 +26,8 @@ struct TruthData {
   // `rotslam eval`.
   TrajectoryMetrics rotations;
   std::optional<TrajectoryMetrics> trajectory;
-  std::vector<int> frames;  // that have ground truth, by their place in RunData::rotations
-  // One per entry of `frames`; all turned by the one rotation that fits best.
+  std::vector<int> frames;  // with ground truth, as indices in RunData::rotations
+  // One per entry of `frames`, aligned by the best-fitting rotation.
   std::vector<Rotation> world_from_cam;
   // After the similarity that fits best; empty without positions. The error is in the ground
   // truth's unit.
@@ -35,8 +35,8 @@ struct TruthData {
   std::vector<double> position_error_m;
 };
 
-/// Everything that a run has left in its folder, as far as it is there.
-// The check suspects the move of the JSON library, which is noexcept.
+/// Contents of a run's folder; files that are missing leave their fields empty.
+// The check does not recognise that moving a JSON value is noexcept.
 // NOLINTNEXTLINE(bugprone-exception-escape)
 struct RunData {
   std::filesystem::path directory;
@@ -49,10 +49,10 @@ struct RunData {
   std::optional<RunMap> keyframe_map;   // map.bin
   std::optional<RunMap> cloud;          // map_all_frames.bin
   std::optional<TruthData> truth;
-  std::string truth_problem;  // why the ground truth beside the images was of no use
+  std::string truth_problem;  // why the ground truth beside the images could not be used
 
   int NumFrames() const { return static_cast<int>(rotations.size()); }
-  /// Whether the camera has moved from its place.
+  /// Whether the run has positions that differ.
   bool HasPositions() const;
 };
 
@@ -60,26 +60,25 @@ struct RunData {
 /// summary.json or rotations.csv is missing, or any file is damaged.
 RunData ReadRunData(const std::filesystem::path& run);
 
-/// Which ground truth to compare with.
+/// The ground truth to compare with.
 struct TruthSource {
-  std::string file;         // empty: what lies with the images, if anything does
+  std::string file;         // empty: the file beside the images, if there is one
   std::string times;        // of a file without times; empty: the `times.txt` beside it
   bool align_axes = false;  // as in MatchOptions
 };
 
-/// Sets `run.truth`. Throws std::runtime_error where a file that was asked for cannot be used; of
-/// one that only lies with the images, `truth_problem` says so.
+/// Sets `run.truth`. Throws std::runtime_error where a file given by the user cannot be used. For a
+/// file found beside the images, the reason is written to `truth_problem` instead.
 void AddTruth(const TruthSource& source, const MetricsOptions& options, RunData& run);
 
 /// Yaw, pitch and roll of a camera against the world: world_from_cam = Ry(yaw) Rx(pitch) Rz(roll).
 /// Seen by the camera's axes (x right, y down, z forward) yaw turns right, pitch up, roll
 /// clockwise.
-/// @return  roll, pitch, yaw of each orientation in degrees, each as close as turns of 360 deg
-/// allow
-///          to the one before.
+/// @return  roll, pitch, yaw of each orientation in degrees; multiples of 360 deg are added so that
+///          each is as close as possible to the one before.
 std::vector<Eigen::Vector3d> RollPitchYawDeg(const std::vector<Rotation>& world_from_cam);
 
-/// What is left between two orientations of a camera, as a rotation vector about its own axes, deg.
+/// Difference of two orientations of a camera as a rotation vector in camera axes, deg.
 Eigen::Vector3d ErrorDeg(const Rotation& world_from_cam, const Rotation& true_world_from_cam);
 
 }  // namespace rotslam

@@ -1,6 +1,6 @@
 // The map in three dimensions. Without positions: the directions that the camera has looked in, on a sphere.
 
-const kHeldColors = ['blue', 'orange', 'violet'];  // by kind: translating, rotating, still
+const kSegmentColors = ['blue', 'orange', 'violet'];  // by kind: translating, rotating, still
 
 class Scene {
   constructor(box) {
@@ -144,10 +144,10 @@ class Scene {
     this.layer('sphere', 'sphere of directions', 'line', this.lines(ring));
   }
 
-  // One line per kind of motion, a dot per frame; dashed where nothing measures the scale.
+  // One line per kind of motion, a dot per frame. Lines are dashed where the scale is not measured.
   addPath() {
     const names = ['path', 'rotating', 'still'];
-    const labels = [hasPositions ? 'camera path' : 'where the camera looks', 'turning in place', 'at rest'];
+    const labels = [hasPositions ? 'camera path' : 'where the camera looks', 'rotating', 'at rest'];
     const at = (k) => Array.from(this.path.slice(3 * k, 3 * k + 3));
     for (let kind = 0; kind < 3; ++kind) {
       const solid = [], loose = [], dots = [];
@@ -170,11 +170,11 @@ class Scene {
       }
       const size = kind === 0 ? (numFrames > 1500 ? 2.5 : 4.5) : 12;
       const points = this.dots(dots, size);
-      // Held frames lie on one spot, which the path around it shall not hide.
+      // Frames of a pure rotation lie at one point, which the path around it shall not hide.
       points.material.depthTest = kind === 0;
       points.renderOrder = kind;
       group.add(points);
-      this.layer(names[kind], labels[kind], kHeldColors[kind], group);
+      this.layer(names[kind], labels[kind], kSegmentColors[kind], group);
     }
   }
 

@@ -23,7 +23,7 @@ struct Thumbnails {
   std::string problem;             // why there are none; empty when there are
 };
 
-/// Reads frames from where the run has read them, or from `sequence` when that is not empty.
+/// Reads frames from the run's sequence, or from `sequence` when that is not empty.
 Thumbnails MakeThumbnails(const RunData& run,
                           const std::string& sequence,
                           const ThumbnailOptions& options);

@@ -99,9 +99,9 @@ CameraPath GimbalPath(const GimbalPathOptions& options) {
   CameraPath path;
   path.fps = options.fps;
   path.num_frames = num_frames;
-  path.stretches = {{0, first_rotating - 1, MotionKind::kTranslating},
-                    {first_rotating, last_rotating, MotionKind::kRotating},
-                    {last_rotating + 1, num_frames - 1, MotionKind::kTranslating}};
+  path.segments = {{0, first_rotating - 1, MotionKind::kTranslating},
+                   {first_rotating, last_rotating, MotionKind::kRotating},
+                   {last_rotating + 1, num_frames - 1, MotionKind::kTranslating}};
   const double yaw_before = 0.12;
   const auto turn_about = [&](TurnAxis axis) {
     return options.axis == axis ? options.turn_deg * kRadFromDeg : 0.0;

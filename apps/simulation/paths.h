@@ -14,22 +14,22 @@ enum class MotionKind { kTranslating, kRotating };
 const char* Name(MotionKind kind);
 
 /// Frames first_frame .. last_frame, both included.
-struct Stretch {
+struct PathSegment {
   int first_frame = 0;
   int last_frame = 0;
   MotionKind kind = MotionKind::kTranslating;
 };
 
-/// A camera's pose as an exact function of time, and how it is filmed.
+/// A camera's pose as an exact function of time, with frame rate and number of frames.
 struct CameraPath {
   /// Pose at a time since the start; any time, also a little before 0 and after the end.
   std::function<StampedPose(double time_s)> at;
   double fps = 30.0;
-  int num_frames = 0;              // frame k is taken at time k / fps
-  std::vector<Stretch> stretches;  // empty: the path is not made of stretches
+  int num_frames = 0;                 // frame k is taken at time k / fps
+  std::vector<PathSegment> segments;  // empty: the path is not made of segments
 };
 
-/// Of a walk with a camera in the hand.
+/// Options of a walk with a hand-held camera.
 struct HandheldPathOptions {
   int num_frames = 150;
   double fps = 30.0;
@@ -37,31 +37,31 @@ struct HandheldPathOptions {
   std::uint64_t seed = 1;    // turns the phases of the sway
 };
 
-/// A walk with the camera in the hand, in the free middle of MakeRoom: position and orientation are
-/// sums of sinusoids, smooth to any order.
+/// A walk with a hand-held camera in the free middle of MakeRoom: position and orientation are sums
+/// of sinusoids, smooth to any order.
 CameraPath HandheldPath(const HandheldPathOptions& options);
 
-/// What a camera turns about: its vertical, its horizontal or its optical axis.
+/// Axis of a camera's rotation: its vertical, horizontal or optical axis.
 enum class TurnAxis { kYaw, kPitch, kRoll };
 
 /// `yaw`, `pitch` or `roll`.
 const char* Name(TurnAxis axis);
 
-/// Of a walk, a turn in place and a walk.
+/// Options of a walk, a pure rotation and another walk.
 struct GimbalPathOptions {
   int num_frames = 120;
   double fps = 30.0;
   TurnAxis axis = TurnAxis::kYaw;
-  double turn_deg = 120.0;   // between the views of the two translating stretches
+  double turn_deg = 120.0;   // between the views of the two translating segments
   double lever_arm_m = 0.0;  // from the axis of the turn forward to the camera's centre
 };
 
-/// Translate, stop, rotate in place, translate on, in the middle of MakeRoom: 30 %, 40 % and 30 %
-/// of the frames. Twice continuously differentiable. Without a lever arm the centre is the very
-/// same three numbers throughout the rotating stretch.
+/// Translates, stops, rotates in place, and translates on, in the middle of MakeRoom, for 30 %, 40
+/// % and 30 % of the frames. Twice continuously differentiable. With lever_arm_m 0 the centre is
+/// exactly constant throughout the rotating segment.
 CameraPath GimbalPath(const GimbalPathOptions& options);
 
-/// Of a drive along a street.
+/// Options of a drive along a street.
 struct StreetPathOptions {
   double fps = 10.0;
   double speed_scale = 1.0;  // 1: 7 m/s

@@ -14,8 +14,8 @@
 
 namespace rotslam {
 
-/// How light becomes grey levels. With noise, exposure change and blur off, the picture of a
-/// surface point depends on the point and the pixel's footprint alone.
+/// Options of the camera's sensor. Without noise, exposure changes and blur the grey value of a
+/// surface point depends only on the point and the pixel's footprint.
 struct RenderOptions {
   double noise_grey = 2.0;           // standard deviation of the sensor noise, in grey levels
   double exposure_variation = 0.05;  // gain wanders within 1 +- this, over a few seconds
@@ -57,7 +57,7 @@ class PixelRays {
   /// runs sideways): even ones are the edges between rows, odd ones their middles. One step, zero,
   /// with a global shutter.
   const std::vector<double>& ExposureTimes() const { return exposure_s_; }
-  /// Which of them a pixel centre or corner has.
+  /// Index of the exposure time of a pixel centre or corner.
   int ExposureOfCenter(int x, int y) const { return ExposureStep(2 * x + 1, 2 * y + 1); }
   int ExposureOfCorner(int x, int y) const { return ExposureStep(2 * x, 2 * y); }
 
@@ -80,11 +80,11 @@ class PixelRays {
   std::vector<Eigen::Vector3d> corners_;
 };
 
-/// Renders what the camera sees at a time, which is that of the middle of the picture where its
-/// shutter rolls; moving boxes stand still meanwhile.
-/// @param pose_at   pose as a function of time; asked at `time_s` and, with blur or a rolling
-///                  shutter, around it.
-/// @param frame     number of the picture; keys its noise together with options.seed.
+/// Renders the image of the camera at a time, which is mid-frame with a rolling shutter; moving
+/// boxes stand still during the readout.
+/// @param pose_at  pose as a function of time; evaluated at `time_s` and, with blur or a rolling
+///                 shutter, around it.
+/// @param frame  number of the picture; determines its noise together with options.seed.
 /// @return  CV_8UC1, or CV_8UC3 with options.color. A pure function of its arguments.
 /// Cost:    two to three tenths of a microsecond a pixel and sub-frame, one ray and about one
 /// texture

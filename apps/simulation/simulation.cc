@@ -141,10 +141,10 @@ Simulation::Simulation(const SimulationOptions& options) : options_(options) {
     truth_.push_back(path_.at(time_s));
     truth_.back().timestamp_s = options.start_s + time_s;
   }
-  for (Stretch stretch : path_.stretches) {
-    stretch.first_frame = std::max(stretch.first_frame, options.first) - options.first;
-    stretch.last_frame = std::min(stretch.last_frame, last) - options.first;
-    if (stretch.first_frame <= stretch.last_frame) stretches_.push_back(stretch);
+  for (PathSegment segment : path_.segments) {
+    segment.first_frame = std::max(segment.first_frame, options.first) - options.first;
+    segment.last_frame = std::min(segment.last_frame, last) - options.first;
+    if (segment.first_frame <= segment.last_frame) segments_.push_back(segment);
   }
   if (options.kind == SimulationKind::kStreet) {
     StreetOptions street;
@@ -179,7 +179,7 @@ SimulatedSequence RenderSequence(const SimulationOptions& options, int num_threa
   SimulatedSequence sequence;
   sequence.camera = simulation.GetCamera();
   sequence.truth = simulation.Truth();
-  sequence.stretches = simulation.Stretches();
+  sequence.segments = simulation.Segments();
   sequence.images.resize(static_cast<std::size_t>(simulation.NumFrames()));
   ParallelFor(simulation.NumFrames(), num_threads, [&](int k) {
     sequence.images[k] = simulation.Render(k);

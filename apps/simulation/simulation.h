@@ -25,7 +25,7 @@ enum class SimulationKind {
 /// `gimbal`, `handheld` or `street`.
 const char* Name(SimulationKind kind);
 
-/// Of a simulated sequence: camera, image noise, blur and moving objects.
+/// Options of a simulated sequence: camera, image noise, blur and moving objects.
 struct SimulationOptions {
   SimulationKind kind = SimulationKind::kGimbal;
   // Frames of the whole path; 0: as many as the kind brings (gimbal 120, handheld 150, a street to
@@ -70,7 +70,7 @@ struct SimulationOptions {
 /// Pinhole camera of a size and horizontal field of view, principal point in the middle.
 Camera CameraWithView(int width, int height, double hfov_deg);
 
-/// A world, a path through it and a camera: every picture of the sequence can be asked for, in any
+/// A world, a path through it and a camera. Every picture of the sequence can be rendered, in any
 /// order and from any thread.
 class Simulation {
  public:
@@ -83,8 +83,8 @@ class Simulation {
   double Fps() const { return path_.fps; }
   /// Pose of each frame, camera->world. Timestamps are whole microseconds.
   const Trajectory& Truth() const { return truth_; }
-  /// Stretches of the path, numbered by the frames rendered; empty but for a gimbal path.
-  const std::vector<Stretch>& Stretches() const { return stretches_; }
+  /// Segments of the path, numbered by the frames rendered; empty but for a gimbal path.
+  const std::vector<PathSegment>& Segments() const { return segments_; }
   /// Pose at any time of the sequence's clock; equals Truth() at the frames' timestamps.
   StampedPose PoseAt(double timestamp_s) const;
 
@@ -99,7 +99,7 @@ class Simulation {
   std::vector<MovingBox> moving_;
   std::unique_ptr<PixelRays> rays_;
   Trajectory truth_;
-  std::vector<Stretch> stretches_;
+  std::vector<PathSegment> segments_;
 };
 
 /// A whole sequence in memory, for tests.
@@ -107,7 +107,7 @@ struct SimulatedSequence {
   Camera camera;
   std::vector<cv::Mat> images;
   Trajectory truth;  // one pose an image
-  std::vector<Stretch> stretches;
+  std::vector<PathSegment> segments;
 };
 
 /// The same bytes at any `num_threads`.

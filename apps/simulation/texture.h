@@ -6,8 +6,8 @@
 
 namespace rotslam {
 
-// Procedural pictures on flat surfaces. Every random choice is a hash of (seed, cell), so that a
-// texture is a pure function of its coordinates: no memory, no order, the same on any thread.
+// Procedural textures of flat surfaces. Every random choice is a hash of (seed, cell), so that a
+// texture is a pure function of its coordinates, equal in any order and on any thread.
 
 /// 64 hashed bits of a seed and two integers; equal arguments give equal bits everywhere.
 inline std::uint64_t HashBits(std::uint64_t seed, std::int64_t i, std::int64_t j) {
@@ -40,7 +40,7 @@ enum class Pattern {
   kSky,    // weak clouds
 };
 
-/// What a surface is painted with.
+/// Appearance of a surface.
 struct Material {
   Pattern pattern = Pattern::kPlaster;
   std::uint64_t seed = 0;

@@ -13,8 +13,9 @@ namespace rotslam {
 namespace {
 
 constexpr int kLeafSize = 3;
-// Rays that graze the seam of two surfaces must not slip through.
-constexpr double kSeam = 1e-9;
+// Tolerance of the borders of a surface, as a share of its edges: rays must not pass between
+// adjacent surfaces.
+constexpr double kBorderTolerance = 1e-9;
 
 // Axis-aligned box around surfaces, a little larger than they are.
 struct Bounds {
@@ -174,9 +175,9 @@ bool World::HitPlate(int surface,
   if (!(distance > kNearest && distance < hit.distance)) return false;
   const Eigen::Vector3d point = origin + distance * direction;
   const double u = plate.u_of_point.dot(point) - plate.u_offset;
-  if (u < -kSeam || u > 1.0 + kSeam) return false;
+  if (u < -kBorderTolerance || u > 1.0 + kBorderTolerance) return false;
   const double v = plate.v_of_point.dot(point) - plate.v_offset;
-  if (v < -kSeam || (plate.triangle ? u + v : v) > 1.0 + kSeam) return false;
+  if (v < -kBorderTolerance || (plate.triangle ? u + v : v) > 1.0 + kBorderTolerance) return false;
   hit = {surface, distance};
   return true;
 }

@@ -62,8 +62,8 @@ struct MovingBox {
   Box At(double time_s) const;
 };
 
-/// Light that does not depend on the viewer: ambient + diffuse * |cos(angle of incidence)|, and for
-/// a lamp falling with the distance.
+/// Diffuse light: ambient + diffuse * |cos(angle of incidence)|. The light of a lamp decreases with
+/// the distance.
 struct Light {
   bool lamp = false;  // a lamp at `place`, else parallel light from the direction `place`
   Eigen::Vector3d place = Eigen::Vector3d(0.4, -0.8, -0.45);
@@ -71,7 +71,7 @@ struct Light {
   float diffuse = 0.5f;
 };
 
-/// Surfaces with what ray casting wants to know about them.
+/// Surfaces with a bounding volume hierarchy for ray casting.
 class World {
  public:
   struct Hit {
@@ -87,9 +87,9 @@ class World {
   const Light& Lighting() const { return light_; }
   const Material& Sky() const { return sky_; }
 
-  /// First surface along a ray (a volume hierarchy is walked: logarithmic in the surfaces).
-  /// @param guess  a surface that is likely hit, e.g. by the ray next to this one; -1: none. Saves
-  ///               time, never changes the answer but for surfaces at exactly the same distance.
+  /// First surface along a ray. The time is logarithmic in the number of surfaces.
+  /// @param guess  a surface that is likely hit, e.g. by the neighbouring ray; -1: none. It saves
+  ///               time and changes the result only between surfaces at exactly the same distance.
   Hit Cast(const Eigen::Vector3d& origin, const Eigen::Vector3d& direction, int guess = -1) const;
 
   /// Distance at which the ray meets the plane of a surface, whether inside its borders or not.
@@ -103,7 +103,7 @@ class World {
   int Sheet(int surface) const { return surface < 0 ? -1 : plates_[surface].sheet; }
 
  private:
-  struct Plate {  // a surface, ready to be hit
+  struct Plate {  // a surface, prepared for intersection
     Eigen::Vector3d normal;
     double offset;               // normal . point on the plane
     Eigen::Vector3d u_of_point;  // u = u_of_point . point - u_offset
@@ -122,7 +122,7 @@ class World {
   };
 
   void BuildNode(int begin, int end, const std::vector<Eigen::Array3d>& centers);
-  // Sorts order_[begin, end) along an axis and says where to cut it.
+  // Sorts order_[begin, end) along an axis and returns the index at which to split it.
   int Split(int begin, int end, int axis, const std::vector<Eigen::Array3d>& centers);
   bool HitPlate(int surface,
                 const Eigen::Vector3d& origin,
@@ -141,7 +141,7 @@ class World {
 /// |x| < 1.5, |z| < 0.9, 1.0 m to 2.3 m above the floor.
 World MakeRoom(std::uint64_t seed);
 
-/// What stands along a simulated street.
+/// Options of the objects along a simulated street.
 struct StreetOptions {
   double camera_height_m = 1.65;
   double road_half_width_m = 4.6;  // nothing solid stands nearer to the path

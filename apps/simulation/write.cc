@@ -200,10 +200,10 @@ std::vector<std::string> WriteSequence(const Simulation& simulation,
   }
   write("camera.yaml", CameraYaml(simulation.GetCamera()));
   write("groundtruth_tum.txt", TumTrajectory(simulation.Truth()));
-  if (!simulation.Stretches().empty()) {
+  if (!simulation.Segments().empty()) {
     std::string list = "first_frame,last_frame,kind\n";
-    for (const Stretch& stretch : simulation.Stretches()) {
-      list += Format("%d,%d,%s\n", stretch.first_frame, stretch.last_frame, Name(stretch.kind));
+    for (const PathSegment& segment : simulation.Segments()) {
+      list += Format("%d,%d,%s\n", segment.first_frame, segment.last_frame, Name(segment.kind));
     }
     write("segments_truth.csv", list);
   }

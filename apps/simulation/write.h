@@ -15,7 +15,7 @@ enum class SequenceLayout {
            // mav0/state_groundtruth_estimate0
 };
 
-/// In which form a simulated sequence is written.
+/// Options for writing a simulated sequence.
 struct WriteOptions {
   SequenceLayout layout = SequenceLayout::kTum;
   int num_threads = 1;  // the bytes written do not depend on it
@@ -24,7 +24,7 @@ struct WriteOptions {
 };
 
 /// Renders and writes a whole sequence. Beside the files of the layout: `camera.yaml`,
-/// `groundtruth_tum.txt` (camera->world, full precision) and, where the path has stretches,
+/// `groundtruth_tum.txt` (camera->world, full precision) and, where the path has segments,
 /// `segments_truth.csv`. Every file is written beside and then renamed.
 /// @return  what was written, relative to `out`, images as one folder.
 /// Throws std::runtime_error when `out` cannot be written or its image folder already holds

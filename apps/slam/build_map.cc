@@ -39,7 +39,7 @@ void Append(Reconstruction& map, Reconstruction part) {
   std::move(part.tracks.begin(), part.tracks.end(), std::back_inserter(map.tracks));
 }
 
-// No map: every frame stands at the origin.
+// The result without a map: every frame is at the origin.
 MapResult WithoutMap(MapResult result, std::string failure) {
   for (const auto& [frame, rotation] : result.cam_from_world) {
     result.center_in_world[frame] = Eigen::Vector3d::Zero();
@@ -48,7 +48,7 @@ MapResult WithoutMap(MapResult result, std::string failure) {
   return result;
 }
 
-// The whole sequence as one pure rotation; nothing of a map is left.
+// The result of a pure rotation throughout: one segment, every frame at the origin, no points.
 MapResult PureRotationThroughout(const MapResult& moving,
                                  const PureRotationResult& rotation,
                                  const Orientations& orientations,
@@ -61,11 +61,11 @@ MapResult PureRotationThroughout(const MapResult& moving,
   result.keyframes = moving.keyframes;
   result.keyframe_tracks = moving.keyframe_tracks;
   result.num_rotation_observations = rotation.num_observations;
-  result.held.push_back(
+  result.segments.push_back(
       {result.cam_from_world.begin()->first,
        result.cam_from_world.rbegin()->first,
        static_cast<double>(rotation.num_observations) / NumObservations(result.keyframe_tracks)});
-  result.is_held_throughout = true;
+  result.rotates_throughout = true;
   return WithoutMap(std::move(result), {});
 }
 
@@ -81,12 +81,12 @@ std::vector<Track> TracksOf(const Orientations& orientations, double blur_s_per_
   return tracks;
 }
 
-// Frames whose tracks show too few points of the maps to place them by; in a segment their places
-// are known.
-std::set<FrameId> FramesApart(const std::vector<Track>& all_tracks,
-                              const RefinedComponents& refined,
-                              const MapResult& result,
-                              int min_points) {
+// Frames whose tracks see too few points of the maps for resection. Frames of pure-rotation
+// segments are left out, since their positions are known.
+std::set<FrameId> UnregisteredFrames(const std::vector<Track>& all_tracks,
+                                     const RefinedComponents& refined,
+                                     const MapResult& result,
+                                     int min_points) {
   std::set<TrackId> known;
   for (const BundleResult& bundle : refined.bundles) {
     for (const auto& [track, point] : bundle.reconstruction.point_in_world) known.insert(track);
@@ -98,15 +98,15 @@ std::set<FrameId> FramesApart(const std::vector<Track>& all_tracks,
   }
   std::set<FrameId> apart;
   for (const auto& [frame, rotation] : result.cam_from_world) {
-    if (num_points[frame] < min_points && SegmentAt(result.held, frame) == nullptr) {
+    if (num_points[frame] < min_points && SegmentAt(result.segments, frame) == nullptr) {
       apart.insert(frame);
     }
   }
   return apart;
 }
 
-// The steps from orientations to the keyframes' map, in their order; each leaves in `result_` what
-// it has found.
+// The steps from orientations to the map of the keyframes, in their order. Each step writes its
+// result to `result_`.
 class KeyframeMapBuilder {
  public:
   KeyframeMapBuilder(const Orientations& orientations,
@@ -126,8 +126,8 @@ class KeyframeMapBuilder {
   void AlignComponents();
   std::optional<MapResult> PureRotationExplainsMore() const;
 
-  // Whether the camera stands still or rotates in its place from the first frame to the last, by
-  // what pairs of views say. Of such a camera a rotation tells the focal length.
+  // Whether, by the relative rotations of pairs of views, the camera is at rest or only rotates
+  // from the first frame to the last. Such a rotation determines the focal length.
   bool StaysThroughout() const;
   bool SeeksFocalLength() const { return StaysThroughout() && options_.ba.lens.refine_focal; }
 
@@ -144,7 +144,7 @@ class KeyframeMapBuilder {
   TrackCompletion complete_;
   RotationMap keyframe_rotations_;
   RefinedComponents refined_;
-  bool has_off_axis_rotations_ = false;  // which another lens would explain, too
+  bool has_off_axis_rotations_ = false;  // a pure rotation with another lens would fit these, too
   MapResult result_;
 };
 
@@ -173,7 +173,7 @@ MapResult KeyframeMapBuilder::Build() {
     if (SeeksFocalLength()) {
       if (auto rotation = PureRotationExplainsMore()) return *std::move(rotation);
     }
-    result_.is_held_throughout = true;
+    result_.rotates_throughout = true;
     return WithoutMap(std::move(result_), {});
   }
 
@@ -203,28 +203,28 @@ MapResult KeyframeMapBuilder::Build() {
 
 bool KeyframeMapBuilder::StaysThroughout() const {
   const PureRotationSegment* everything =
-      SegmentAt(result_.held, result_.cam_from_world.begin()->first);
+      SegmentAt(result_.segments, result_.cam_from_world.begin()->first);
   return everything != nullptr && everything->last == result_.cam_from_world.rbegin()->first;
 }
 
 void KeyframeMapBuilder::FindPureRotationSegments() {
-  result_.held = rotslam::FindPureRotationSegments(
+  result_.segments = rotslam::FindPureRotationSegments(
       orientations_.graph, result_.cam_from_world, options_.pure_rotation_segments);
   if (StaysThroughout()) return;
-  const auto num_segments = result_.held.size();
-  result_.held = WithoutOffAxisRotations(
-      std::move(result_.held),
+  const auto num_segments = result_.segments.size();
+  result_.segments = WithoutOffAxisRotations(
+      std::move(result_.segments),
       {orientations_.camera, orientations_.graph, result_.cam_from_world, all_tracks_},
       options_.rotodom.relative_rotation,
       bundle_options_);
-  has_off_axis_rotations_ = result_.held.size() < num_segments;
+  has_off_axis_rotations_ = result_.segments.size() < num_segments;
 }
 
 void KeyframeMapBuilder::SelectKeyframes() {
   result_.keyframes = rotslam::SelectKeyframes(
       result_.cam_from_world,
       all_tracks_,
-      SeeksFocalLength() ? std::vector<PureRotationSegment>() : result_.held,
+      SeeksFocalLength() ? std::vector<PureRotationSegment>() : result_.segments,
       options_.keyframes);
   result_.keyframe_tracks = RestrictTracks(all_tracks_, result_.keyframes, 3);
   for (const FrameId frame : result_.keyframes) {
@@ -249,7 +249,7 @@ void KeyframeMapBuilder::AdjustComponents() {
   refined_ = RefineComponents(keyframe_rotations_,
                               result_.krot,
                               result_.keyframe_tracks,
-                              result_.held,
+                              result_.segments,
                               orientations_.camera,
                               bundle_options_,
                               complete_);
@@ -263,10 +263,11 @@ void KeyframeMapBuilder::CorrectMaps() {
     sources.lookalikes.push_back({check.frame, check.match});
   }
   sources.places = orientations_.places;
-  sources.apart = FramesApart(all_tracks_, refined_, result_, options_.resection.min_inliers);
+  sources.unregistered =
+      UnregisteredFrames(all_tracks_, refined_, result_, options_.resection.min_inliers);
   sources.describe = DescriptionByImages(refined_.camera);
   sources.complete = complete_;
-  sources.held = result_.held;
+  sources.segments = result_.segments;
   result_.relocalised = rotslam::CorrectMaps(std::move(sources),
                                              orientations_.camera,
                                              result_.keyframe_tracks,
@@ -289,7 +290,7 @@ void KeyframeMapBuilder::AlignComponents() {
                                                bundle.reconstruction,
                                                {result_.cam_from_world,
                                                 orientations_.timestamps_s,
-                                                result_.held,
+                                                result_.segments,
                                                 all_tracks_,
                                                 result_.camera,
                                                 options_.resection,
@@ -339,7 +340,7 @@ MapViews KeyframeMapBuilder::ReadViews(const Reconstruction& map,
   return views;
 }
 
-// Null where tracks are not to be completed.
+// Null where the options or missing images rule out track completion.
 TrackCompletion KeyframeMapBuilder::CompletionByImages() const {
   if (!options_.completion.enabled || images_ == nullptr) return nullptr;
   return [this](const Reconstruction& map, const Camera& camera) {
@@ -352,7 +353,7 @@ TrackCompletion KeyframeMapBuilder::CompletionByImages() const {
   };
 }
 
-// Null where images are not to be had.
+// Null without images.
 FrameDescription KeyframeMapBuilder::DescriptionByImages(const Camera& camera) const {
   if (images_ == nullptr) return nullptr;
   return [this, &camera](const Reconstruction& map, const std::set<FrameId>& frames) {
@@ -376,7 +377,7 @@ void RegisterRemainingFrames(const Orientations& orientations,
                              MapResult& result) {
   observer.OnBegin(SlamStage::kFrameRegistration, -1);
   RegisterFrames(orientations, all_tracks, options, result);
-  // Their neighbours have moved a little since.
+  // Bundle adjustment has moved the frames between which these are interpolated.
   std::set<FrameId> unknown = orientations.unconnected;
   std::erase_if(unknown, [&](FrameId frame) { return result.map.cam_from_world.contains(frame); });
   InterpolateUnknown(orientations, unknown, result.cam_from_world);
@@ -394,7 +395,7 @@ void MakeCloud(const std::vector<Track>& all_tracks,
                                                  result.cam_from_world,
                                                  result.center_in_world,
                                                  result.map.point_in_world,
-                                                 result.held},
+                                                 result.segments},
                                                 all_tracks,
                                                 bundle_options);
   result.cloud = WithoutShallowPoints(all_points, options.cloud_min_angle_deg);

@@ -8,23 +8,23 @@
 
 namespace rotslam {
 
-/// From orientations to positions and points: pure-rotation segments, keyframes and tracks, the
-/// known-rotation problem, bundle adjustment with the keyframes' images, map correction, alignment
-/// of components, the frames between keyframes, the cloud.
+/// Builds a map from orientations. The steps: pure-rotation segments, keyframes and tracks, known
+/// rotation, bundle adjustment with the keyframes' images, map correction, alignment of the
+/// components, registration of the frames between keyframes, the cloud.
 ///
-/// Parts of the map that no track with depth links keep their own scale (`components`). They are
-/// put together by continuity (AlignComponent).
+/// Keyframes that share no tracks with depth form components, each with a scale of its own
+/// (`components`). AlignComponent joins them.
 /// @param orientations  with features kept.
-/// @param images        null: tracks are not completed, and the map is corrected by the places that
-///                      the orientations have kept alone.
-/// @return  with `failure` where there is no map.
+/// @param images  null: tracks are not completed, and the map is corrected with the places that the
+///                orientations hold alone.
+/// @return  `failure` is set where there is no map.
 MapResult BuildMap(const Orientations& orientations,
                    const SlamOptions& options,
                    ImageProvider* images,
                    SlamObserver& observer);
 
-/// BuildMap up to bundle adjustment, without images: what asks for the lens or the keyframes alone
-/// need not wait for the rest. Has no cloud, and the frames between keyframes no positions.
+/// Runs BuildMap up to bundle adjustment and without images, for callers that need only the lens or
+/// the keyframes. The result has no cloud and no positions of the frames between keyframes.
 MapResult BuildKeyframeMap(const Orientations& orientations,
                            const SlamOptions& options,
                            SlamObserver& observer);

@@ -11,29 +11,30 @@
 
 namespace rotslam {
 
-/// Focal length to begin with where nothing tells one, px: 1.2 times the longer side, 45 deg of
-/// view, between a phone (0.7 to 0.9) and a moderate zoom lens.
+/// First guess of the focal length of an unknown camera, px: 1.2 times the longer side of the
+/// image, 45 deg of view. It lies between phones (0.7 to 0.9 times) and moderate zoom lenses.
 double GuessFocalLength(const cv::Size& image_size);
 
-/// A camera of that focal length: no distortion, principal point in the middle.
+/// A camera of that focal length without distortion, with the principal point in the middle of the
+/// image.
 Camera UncalibratedCamera(const cv::Size& image_size, double focal_px);
 
-/// Lets bundle adjustment move the focal length as far as the images want.
+/// Lets bundle adjustment refine the focal length without a prior.
 void FreeFocalLength(LensOptions& lens);
 
-/// A camera by the beginning of a sequence.
+/// The camera estimated from the beginning of a sequence.
 struct FocalLengthEstimate {
   Camera camera;
-  std::optional<ReadoutEstimate> readout;  // set: the images told it
-  bool is_found = false;                   // else the camera's focal length is the one given
+  std::optional<ReadoutEstimate> readout;  // set: it was estimated from the images
+  bool is_found = false;                   // false: `camera` has the focal length given
   bool interrupted = false;                // the observer asked to stop
 };
 
-/// Improves a guessed focal length: solves the beginning of the sequence, 600 frames, for
-/// orientations and positions with the focal length free, until that changes it little. A wrong
-/// focal length bends orientations (twice the right one loses KITTI 00 in its turn), positions tell
-/// it all the same, and so does pure rotation.
-/// @param frames  are at their beginning afterwards.
+/// Improves a guessed focal length. The first 600 frames of the sequence are solved for
+/// orientations and positions with the focal length free, repeatedly, until it changes little.
+/// Orientations alone are not enough: with a wrong focal length they are wrong, too. Positions
+/// determine the focal length all the same, and so does a pure rotation.
+/// @param frames  rewound to the first frame at the end.
 /// @param camera  see UncalibratedCamera.
 /// Throws what FindOrientations throws.
 FocalLengthEstimate FindFocalLength(FrameSource& frames,

@@ -10,7 +10,7 @@
 
 namespace rotslam {
 
-/// One frame as it was tracked, without its image.
+/// What the odometry found for one frame; the image is not stored.
 struct RecordedFrame {
   Frame frame;
   FrameRecord record;
@@ -22,26 +22,26 @@ struct RecordedFrame {
   }
 };
 
-/// Keeps the first stage's frames as they come, so that a run that was killed goes on from them.
+/// Stores the frames of the first stage one by one, so that an interrupted run can be resumed.
 class FrameLog {
  public:
   virtual ~FrameLog() = default;
 
-  /// The frames of the interrupted run, one by one; nullopt after the last. Throws
-  /// std::runtime_error where they are damaged.
+  /// The next frame of the interrupted run; nullopt after the last. Throws std::runtime_error where
+  /// the log is damaged.
   virtual std::optional<RecordedFrame> NextRecorded() = 0;
-  /// Gives the odometry the state that it had after them.
+  /// Restores the state of the odometry after the last recorded frame.
   virtual void Restore(LoopedOdometry& odometry) const = 0;
 
-  /// The camera's readout, where the interrupted run had found it from the images.
+  /// The readout of the camera, where the interrupted run had estimated it from the images.
   virtual const std::optional<ReadoutEstimate>& readout() const = 0;
-  /// Removes all frames: the sequence is tracked once more with this readout.
+  /// Removes all frames; tracking starts again from the first frame with this readout.
   virtual void StartOver(const ReadoutEstimate& readout) = 0;
 
   /// Whether frames are to be appended.
   virtual bool IsOn() const = 0;
   virtual void Append(RecordedFrame& frame) = 0;
-  /// Whether enough frames were appended since the last Commit().
+  /// Whether enough frames were appended since the last Commit() to call it again.
   virtual bool IsDue() const = 0;
   /// @param state  the odometry's, after the frame appended last.
   virtual void Commit(std::string state) = 0;

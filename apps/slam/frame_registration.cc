@@ -23,11 +23,11 @@ void RegisterFrames(const Orientations& orientations,
   std::vector<FrameId> remaining;
   for (const auto& [frame, rotation] : result.cam_from_world) {
     if (anchors.contains(frame)) continue;
-    // Inside a segment the place is that of its ends, to the last bit.
-    const PureRotationSegment* stretch = SegmentAt(result.held, frame);
-    if (stretch != nullptr &&
-        (anchors.contains(stretch->first) || anchors.contains(stretch->last))) {
-      const FrameId end = anchors.contains(stretch->first) ? stretch->first : stretch->last;
+    // Within a segment the position equals that of the segment's end exactly.
+    const PureRotationSegment* segment = SegmentAt(result.segments, frame);
+    if (segment != nullptr &&
+        (anchors.contains(segment->first) || anchors.contains(segment->last))) {
+      const FrameId end = anchors.contains(segment->first) ? segment->first : segment->last;
       result.center_in_world[frame] = anchors.at(end);
     } else {
       remaining.push_back(frame);

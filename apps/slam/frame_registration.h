@@ -8,12 +8,13 @@
 
 namespace rotslam {
 
-/// Poses of the frames that `result.map` does not hold: resected against its points, their
-/// orientations being measurements as good as AnchorCovariances says; in a segment, the place of
-/// its end; interpolated where neither tells.
+/// Registers the frames that `result.map` does not hold. A frame is resected against the points of
+/// the map; its orientation enters as a measurement with the covariance of AnchorCovariances. Where
+/// that fails, a frame of a pure-rotation segment takes the position of the end of the segment, and
+/// any other frame is interpolated in time.
 /// @param all_tracks  of all frames, those of the map's points among them.
-/// @param result      has map, camera, segments, and orientations of all frames that follow the
-///                    map's; gets the positions, better orientations and the counts.
+/// @param result  map, camera, segments and orientations of all frames, consistent with the map,
+///                must be set; receives the positions, refined orientations and the counts.
 void RegisterFrames(const Orientations& orientations,
                     const std::vector<Track>& all_tracks,
                     const SlamOptions& options,

@@ -14,13 +14,13 @@
 
 namespace rotslam {
 
-/// Images of frames that were tracked before, for the stages that look at them once more.
+/// Gives images of frames that were tracked before to the stages that need them again.
 class ImageProvider {
  public:
   virtual ~ImageProvider() = default;
 
-  /// Calls `take` with the image of each of `frames`, ids ascending. An image that cannot be had is
-  /// left out, and `tell` gets one line that says why.
+  /// Calls `take` with the image of each of `frames`, ids ascending. An image that cannot be read
+  /// is left out; `tell` then gets one line with the reason.
   virtual void Read(const std::set<FrameId>& frames,
                     const std::function<void(FrameId frame, const cv::Mat& image)>& take,
                     const std::function<void(const std::string& problem)>& tell) = 0;
@@ -36,12 +36,12 @@ class FrameSource : public ImageProvider {
   virtual void Skip(int count) = 0;
   /// The next frame is the first one again.
   virtual void Rewind() = 0;
-  /// Frames in all as far as is known; negative where nothing is.
+  /// Number of frames of the sequence; negative where it is not known.
   virtual int NumFrames() const = 0;
 };
 
-/// The frames of a sequence on disk (OpenSequence). Read() opens it once more, so that the
-/// sequence itself keeps what it has learnt at its end.
+/// The frames of a sequence on disk (OpenSequence). Read() opens the sequence a second time, so
+/// that the position of Next() does not change.
 class SequenceSource : public FrameSource {
  public:
   /// Throws as OpenSequence does.

@@ -8,11 +8,11 @@
 
 namespace rotslam {
 
-/// Takes frames through the odometry: first those that the log has, as they were found then, and
-/// from there on the images, which are recorded in turn.
+/// Passes frames through the odometry. Frames that the log has are replayed from it; the others are
+/// read as images, tracked and recorded.
 class FrameStream {
  public:
-  /// @param log  null: the images from the first one on, nothing is recorded.
+  /// @param log  null: all frames are read as images, and nothing is recorded.
   FrameStream(FrameSource& frames, LoopedOdometry& odometry, FrameLog* log);
 
   struct Step {
@@ -20,10 +20,10 @@ class FrameStream {
     LoopedEstimate estimate;
   };
   /// The next frame; nullopt after the last.
-  /// @param needs_points  of its estimate; else they may be missing.
+  /// @param needs_points  whether the estimate must have its points.
   std::optional<Step> Next(bool needs_points);
 
-  /// Keeps all frames so far. To be called after the last one, too.
+  /// Writes all frames so far to the log. Call it after the last frame, too.
   void Commit();
 
  private:

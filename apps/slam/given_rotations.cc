@@ -11,13 +11,15 @@
 namespace rotslam {
 namespace {
 
-// An orientation this near in time counts as the frame's own, whatever the gap, s.
+// An orientation within this time of a frame is used as it is, whatever the gap around it, s.
 constexpr double kExactS = 1e-4;
-// Longest gap that is interpolated over, s: motion capture and IMUs run at 100 Hz and more.
+// Longest gap in the given orientations over which they are interpolated, s. Motion capture and
+// IMUs run at 100 Hz and more, so a longer gap is a dropout.
 constexpr double kMaxGapS = 0.2;
-// Below this, no reading of a file is called wrong: noise decides between them.
+// Smallest disagreement at which another convention is considered, deg. Below it noise would
+// decide.
 constexpr double kMinDisagreementDeg = 0.5;
-// How many times better another reading must fit before it is believed.
+// Another convention must fit this many times better to be reported.
 constexpr double kClearlyBetter = 5.0;
 
 double MedianOverEdges(const ViewGraph& graph,
@@ -28,7 +30,7 @@ double MedianOverEdges(const ViewGraph& graph,
   return Median(std::move(errors));
 }
 
-// Median angle between the edges and `read` of the orientations.
+// Median angle between the edges and the orientations after `read` is applied to them, deg.
 double Disagreement(const ViewGraph& graph,
                     const RotationMap& cam_from_world,
                     const std::function<Rotation(const Rotation&)>& read) {
@@ -39,7 +41,7 @@ double Disagreement(const ViewGraph& graph,
   });
 }
 
-// What w first, taken for w last, has made of a quaternion, undone; of camera->world ones.
+// Undoes the reading of a camera->world quaternion with qw first as one with qw last.
 Rotation WithWFirst(const Rotation& cam_from_world) {
   const Eigen::Vector4d wrong = cam_from_world.Inverse().Quaternion().coeffs();
   return Rotation(Eigen::Quaterniond(wrong[0], wrong[1], wrong[2], wrong[3])).Inverse();
@@ -52,7 +54,7 @@ void RefuseOtherConventions(const std::string& file,
   const RotationMap& rotations = given.cam_from_world;
   const auto refuse = [&](double other_deg, const std::string& hint) {
     if (kClearlyBetter * other_deg > given.disagreement_deg) return;
-    throw std::runtime_error(file + ": its turns disagree with the images by " +
+    throw std::runtime_error(file + ": its rotations disagree with the images by " +
                              FormatNumber("%.2f", given.disagreement_deg) + " deg (median), " +
                              hint + " by " + FormatNumber("%.2f", other_deg) +
                              " deg: orientations must be camera->world, qx qy qz qw, of camera "
@@ -63,7 +65,8 @@ void RefuseOtherConventions(const std::string& file,
   refuse(Disagreement(graph, rotations, WithWFirst), "with qw in front");
   refuse(Disagreement(graph, rotations, [](const Rotation& r) { return WithWFirst(r).Inverse(); }),
          "taken for world->camera with qw in front");
-  // Turns of a body that the camera is fixed to have the camera's angles, about other axes.
+  // Relative rotations of a body that is fixed to the camera have the same angles as the camera's,
+  // about other axes.
   refuse(MedianOverEdges(graph,
                          [&](const RelativeRotation& edge) {
                            const Rotation j_from_i =

@@ -12,13 +12,13 @@
 
 namespace rotslam {
 
-/// Orientations from a gimbal, an IMU or another system.
+/// Orientations of a gimbal, an IMU or another system.
 struct OrientationsFromElsewhere {
   std::string name;                        // of their file, for messages
   std::vector<StampedRotation> rotations;  // timestamps ascending, two or more
 };
 
-/// Orientations that come from elsewhere, and how they fit the images.
+/// Given orientations of all frames, and how well they agree with the images.
 struct GivenRotations {
   std::string file;
   RotationMap cam_from_world;                     // of every frame
@@ -28,10 +28,11 @@ struct GivenRotations {
 
 /// The given orientations at the times of the frames, interpolated over gaps of at most 0.2 s.
 /// @param timestamps_s  by frame id.
-/// @param graph         relative rotations of the images: where they fit the given orientations far
-///                      better in another convention, that is an error that names it.
-/// Throws std::runtime_error in one line: frames that the orientations do not cover, a convention
-/// that is not ours.
+/// @param graph  relative rotations measured in the images. Given orientations that fit them far
+///               better in another convention (inverse, other axes) are refused with an error that
+///               names the convention.
+/// Throws std::runtime_error with one line where orientations are missing for some frames or follow
+/// another convention.
 GivenRotations MatchGivenRotations(const OrientationsFromElsewhere& given,
                                    const std::vector<double>& timestamps_s,
                                    const ViewGraph& graph);

@@ -11,7 +11,7 @@
 namespace rotslam {
 namespace {
 
-// The frames next to one: before and behind, or the next two where there is none on one side.
+// The frames before and after one, or the two nearest on one side where the other has none.
 std::array<FrameId, 2> NextTo(FrameId frame, const RotationMap& cam_from_world) {
   const int value = frame.value;
   if (!cam_from_world.contains(FrameId{value - 1})) return {FrameId{value + 1}, FrameId{value + 2}};
@@ -24,7 +24,7 @@ void SetTurnsWhileExposed(const Orientations& orientations, MapViews& views) {
   const auto time_s = [&](FrameId id) { return orientations.timestamps_s[id.value]; };
   for (auto& [frame, view] : views) {
     const auto rate = RateOf(frame, orientations.cam_from_world, time_s, kFarthestFrameForBlur_s);
-    if (rate) view.turn_while_exposed = orientations.exposure_s * *rate;
+    if (rate) view.rotation_while_exposed = orientations.exposure_s * *rate;
   }
 }
 
@@ -79,7 +79,7 @@ void SetMotions(const MotionSources& sources, const Reconstruction& map, MapView
       others.push_back({time_s(next), pose->second.cam_from_world});
       ways.push_back({time_s(next) - here.time_s, pose->second.center_in_world - center->second});
     }
-    // A map may have corrected an orientation.
+    // The map may have corrected the orientations since the odometry.
     if (others.size() == 2) view.motion = MotionThrough(here, others);
     view.velocity = PolynomialThrough(ways).col(0);
   }

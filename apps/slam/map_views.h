@@ -13,13 +13,13 @@
 
 namespace rotslam {
 
-/// Views of `frames`, of images read anew.
-/// @param tell  receives one line for each image that cannot be read again; the rest are there.
+/// Reads the images of `frames` again and makes views of them.
+/// @param tell  receives one line for each image that cannot be read again; the result lacks these.
 MapViews ReadMapViews(ImageProvider& images,
                       const std::set<FrameId>& frames,
                       const std::function<void(const std::string& problem)>& tell);
 
-/// What tells how the camera moved around the views of a map.
+/// Inputs from which the motion of the camera during a frame is estimated.
 struct MotionSources {
   const Orientations& orientations;
   const std::vector<Track>& tracks;  // of all frames
@@ -28,13 +28,14 @@ struct MotionSources {
   int num_threads = 1;
 };
 
-/// Gives the views the motion that a rolling shutter sees: the turn and the velocity through the
-/// frames before and behind each, which are placed by the map's points. Where they cannot be, the
-/// turn is the odometry's and the velocity 0. With a global shutter there is neither. And the turn
-/// that blurs the image, where that tells how long it was exposed.
+/// Sets the motion of the camera during each view. With a rolling shutter that is the angular and
+/// linear velocity through the frames before and after the view, which are resected against the
+/// points of the map; where that fails, the angular velocity is the odometry's and the linear
+/// velocity is zero. With a global shutter both are zero. Where the exposure time is known, the
+/// rotation during it is set as well, for motion blur.
 void SetMotions(const MotionSources& sources, const Reconstruction& map, MapViews& views);
 
-/// Described corners of the views, where a global shutter would see them.
+/// Detects and describes corners of the views; their positions are those in a global-shutter image.
 std::map<FrameId, Features> DescribeViews(const MapViews& views,
                                           const Camera& camera,
                                           const FeatureOptions& options,

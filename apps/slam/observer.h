@@ -29,8 +29,8 @@ struct FrameProgress {
   const OdometryResult& odometry;  // so far, this frame included
 };
 
-/// Is told how the system gets on, and may ask it to stop. Calls come from the thread that runs
-/// the system; values are valid during the call. Every method may be left as it is.
+/// Receives the progress of the system and may stop it. Calls come from the thread that runs the
+/// system; arguments are valid during the call only. The default of every method does nothing.
 class SlamObserver {
  public:
   virtual ~SlamObserver() = default;
@@ -39,11 +39,11 @@ class SlamObserver {
   ///                   or their number is not known.
   virtual void OnBegin(SlamStage /*stage*/, int /*num_steps*/) {}
   virtual void OnFrame(const FrameProgress& /*progress*/) {}
-  /// The images tell how the sensor is read out. The first stage starts again with it.
+  /// The readout was estimated from the images. The first stage starts again with it.
   virtual void OnReadoutFound(const ReadoutEstimate& /*readout*/) {}
-  /// An image of a frame of the map cannot be read again; points are not looked for in it.
+  /// The image of a frame of the map cannot be read again; no points are looked for in it.
   virtual void OnMissingImage(const std::string& /*problem*/) {}
-  /// Pass number `pass`, from 1, over the beginning of the sequence for the focal length.
+  /// Pass `pass` (from 1) over the beginning of the sequence starts, to estimate the focal length.
   virtual void OnFocalPass(int /*pass*/, double /*focal_px*/) {}
 
   /// The first stage has ended; some fields of `orientations` are the results of later stages.
@@ -51,7 +51,7 @@ class SlamObserver {
   /// A later stage has ended; `map` has what is known by then.
   virtual void OnEnd(SlamStage /*stage*/, const MapResult& /*map*/) {}
 
-  /// Asked after every frame of the first stage; true ends it, with the frames so far.
+  /// Called after every frame of the first stage; true ends the stage with the frames so far.
   virtual bool ShouldStop() { return false; }
 };
 

@@ -40,7 +40,7 @@ void InterpolateUnknown(const Orientations& orientations,
 
 namespace {
 
-// The first frame of every piece of the view-graph but the first.
+// The first frame of every connected component of the view-graph except the first one.
 std::vector<FrameId> FindBreaks(const ViewGraph& graph, const RotationMap& rotations) {
   DisjointSets pieces;
   for (const RelativeRotation& edge : graph.edges()) pieces.Join(edge.i.value, edge.j.value);
@@ -54,9 +54,9 @@ std::vector<FrameId> FindBreaks(const ViewGraph& graph, const RotationMap& rotat
   return breaks;
 }
 
-// The places of loops that were not accepted, and some before and behind them.
-std::map<FrameId, Features> DoubtfulPlaces(std::map<FrameId, Features> places,
-                                           const std::vector<LoopCheck>& loops) {
+// The places of loops that were rejected, and some places before and after them.
+std::map<FrameId, Features> PlacesOfRejectedLoops(std::map<FrameId, Features> places,
+                                                  const std::vector<LoopCheck>& loops) {
   constexpr int kAround = 3;
   std::set<FrameId> doubtful;
   const auto add_around = [&](FrameId frame) {
@@ -77,8 +77,9 @@ std::map<FrameId, Features> DoubtfulPlaces(std::map<FrameId, Features> places,
   return places;
 }
 
-// Tracks all frames, or as many as the observer lets.
-// @return  the readout, where the images say that the shutter rolls: then nothing else counts.
+// Tracks all frames, or those until the observer stops.
+// @return  the readout, where the images show a rolling shutter; the orientations are then
+//          unfinished.
 std::optional<ReadoutEstimate> TrackFrames(FrameStream& stream,
                                            LoopedOdometry& odometry,
                                            ReadoutDecision& decision,
@@ -108,7 +109,7 @@ void TakeResults(LoopedOdometry& odometry, bool keep_features, Orientations& ori
   orientations.loops.insert(orientations.loops.end(), last_loops.begin(), last_loops.end());
   orientations.num_places = odometry.num_places();
   if (keep_features)
-    orientations.places = DoubtfulPlaces(odometry.TakePlaces(), orientations.loops);
+    orientations.places = PlacesOfRejectedLoops(odometry.TakePlaces(), orientations.loops);
   orientations.exposure_s = odometry.exposure_s();
   orientations.seconds = odometry.odometry_seconds();
   orientations.loop_seconds = odometry.loop_seconds();
@@ -130,10 +131,10 @@ void RequireFramesAndEdges(const Orientations& orientations) {
   }
 }
 
-// What is told of frames by all edges together: those without, those interpolated, pieces.
-void JudgeFrames(const OrientationInputs& inputs,
-                 const AveragingOptions& options,
-                 Orientations& orientations) {
+// Sets what follows from all edges together: frames without edges, interpolated frames, breaks.
+void ClassifyFrames(const OrientationInputs& inputs,
+                    const AveragingOptions& options,
+                    Orientations& orientations) {
   for (const auto& [frame, rotation] : orientations.cam_from_world) {
     if (orientations.graph.EdgesOf(frame).empty()) orientations.unconnected.insert(frame);
   }
@@ -151,8 +152,8 @@ void JudgeFrames(const OrientationInputs& inputs,
   }
 }
 
-// FindOrientations with a camera whose readout is known, or is not asked for by what was read
-// before.
+// FindOrientations with a camera whose readout is known, or with the readout that the interrupted
+// run had estimated.
 Orientations FindWithReadout(FrameSource& frames,
                              const Camera& camera,
                              const std::optional<ReadoutEstimate>& readout,
@@ -182,7 +183,7 @@ Orientations FindWithReadout(FrameSource& frames,
   if (orientations.interrupted && !orientations.IsUsable()) return orientations;
   RequireFramesAndEdges(orientations);
   stream.Commit();
-  JudgeFrames(inputs, options.rotodom.averaging, orientations);
+  ClassifyFrames(inputs, options.rotodom.averaging, orientations);
   observer.OnEnd(SlamStage::kOrientations, orientations);
   return orientations;
 }
@@ -210,7 +211,7 @@ std::map<FrameId, double> OrientationSigmas(const Orientations& orientations) {
 RotationScale RotationScaleOf(const std::vector<LoopCheck>& loops) {
   std::vector<double> factors;
   for (const LoopCheck& loop : loops) {
-    if (loop.accepted && loop.way.turn_scale != 1.0) factors.push_back(loop.way.turn_scale);
+    if (loop.accepted && loop.scaled.turn_scale != 1.0) factors.push_back(loop.scaled.turn_scale);
   }
   const int num_loops = static_cast<int>(factors.size());
   return {Median(std::move(factors), 1.0), num_loops};

@@ -16,14 +16,14 @@
 
 namespace rotslam {
 
-/// What the first stage knows once the sequence has been read.
+/// The result of the first stage.
 struct Orientations : OdometryResult {
   bool interrupted = false;                // the observer asked to stop before the sequence's end
-  Camera camera;                           // as given, with the readout that the images tell
-  std::optional<ReadoutEstimate> readout;  // set: the images told it
+  Camera camera;                           // as given, with the readout estimated from the images
+  std::optional<ReadoutEstimate> readout;  // set: it was estimated from the images
   std::vector<double> timestamps_s;        // by frame id
   std::vector<std::string> image_names;    // by frame id
-  // Set: `cam_from_world` and `covariance` are these, and only the edges are the images'.
+  // Set: `cam_from_world` and `covariance` are the given ones, and the images yield only the edges.
   std::optional<GivenRotations> given;
   int num_unreadable = 0;
   std::set<FrameId> unconnected;  // without an edge; their orientations are interpolated, or given
@@ -32,11 +32,11 @@ struct Orientations : OdometryResult {
   // view-graph, whose rotation against the piece before is extrapolated.
   std::vector<FrameId> breaks;
   std::vector<LoopCheck> loops;  // places that looked like older ones
-  int num_places = 0;            // that were remembered
-  // With features kept: described corners of the places that looked like others but are not known
-  // to be the same, and of those around them.
+  int num_places = 0;            // frames stored for loop closure
+  // With features kept: described corners of the places that looked like others without being
+  // verified as the same, and of the places around them. Map correction compares them again.
   std::map<FrameId, Features> places;
-  double exposure_s = 0.0;  // by motion blur, at the end; 0: unknown
+  double exposure_s = 0.0;  // estimated from motion blur, at the end; 0: unknown
   OdometrySeconds seconds;
   LoopSeconds loop_seconds;
   double global_averaging_seconds = 0.0;
@@ -47,40 +47,41 @@ struct Orientations : OdometryResult {
   bool IsUsable() const { return timestamps_s.size() >= 3 && !graph.edges().empty(); }
 };
 
-/// What the first stage takes beside the frames.
+/// Inputs of the first stage beside the frames.
 struct OrientationInputs {
   std::shared_ptr<const Vocabulary> vocabulary;  // null: the one that comes with the library
   bool keep_features = true;                     // for the map
-  // Set: these replace the orientations that the images tell.
+  // Set: these replace the orientations estimated from the images.
   std::optional<OrientationsFromElsewhere> given;
   FrameLog* log = nullptr;  // null: nothing is recorded
 };
 
-/// Reads the frames to their end and finds every frame's orientation. Frames that could not be
-/// matched get theirs by interpolation in time between the nearest frames that could. Where the
-/// camera does not know its readout and the images tell that the shutter rolls, the frames are read
-/// once more from the first one.
+/// Reads all frames and estimates their orientations. A frame without matches gets the orientation
+/// interpolated in time between the nearest frames that have one. Where the calibration does not
+/// give the readout and the images show a rolling shutter, tracking starts again from the first
+/// frame.
 /// Throws std::runtime_error when there are fewer than three frames or no two of them match, and
 /// what MatchGivenRotations throws; std::invalid_argument when an option is out of range.
-/// @return  when the observer has stopped it early, possibly without a single edge, see IsUsable().
+/// @return  incomplete, possibly without a single edge, when the observer has stopped it
+///          (IsUsable()).
 Orientations FindOrientations(FrameSource& frames,
                               const Camera& camera,
                               const SlamOptions& options,
                               const OrientationInputs& inputs,
                               SlamObserver& observer);
 
-/// Gives frames whose orientation is not known that between those of the nearest frames in time
-/// that have one; again once these have been refined. Given orientations stay.
+/// Interpolates the orientation of the frames in `unknown` in time between the nearest other
+/// frames. Call it again once those have been refined. Given orientations are not changed.
 void InterpolateUnknown(const Orientations& orientations,
                         const std::set<FrameId>& unknown,
                         RotationMap& cam_from_world);
 
-/// Standard deviation of every orientation whose covariance is known, rad: the root of the mean
-/// variance about its three axes, against the first frame.
+/// Standard deviation of every orientation whose covariance is known, rad, relative to the first
+/// frame: the root of the mean variance about the three axes.
 std::map<FrameId, double> OrientationSigmas(const Orientations& orientations);
 
-/// Median of the factors by which closed loops right round say that all rotations are too large
-/// (above one) or too small; one where no loop says.
+/// Scale error of all rotations, from loops along which the camera turned right round: the median
+/// of true angle over measured angle. 1 where there is no such loop.
 struct RotationScale {
   double factor = 1.0;
   int num_loops = 0;

@@ -5,11 +5,11 @@
 namespace rotslam {
 namespace {
 
-// Frames after which it looks first, and how many times as many after which it looks next. In its
-// first seconds a camera may hardly have started to turn (0.023 s of 0.030 after 30 frames of a
-// gimbal, 0.034 of 0.026 after 60 of a hand-held Kinect).
-constexpr std::size_t kFirstLook = 120;
-constexpr std::size_t kBetweenLooks = 4;
+// Number of frames after which the readout is first estimated, and the factor between the numbers
+// of two estimates. With fewer frames the camera has often hardly rotated, and the estimate is off
+// by tens of percent.
+constexpr std::size_t kFirstEstimateFrames = 120;
+constexpr std::size_t kEstimateFactor = 4;
 
 }  // namespace
 
@@ -19,26 +19,28 @@ ReadoutDecision::ReadoutDecision(const Camera& camera, const SlamOptions& option
       relative_rotation_(options.rotodom.relative_rotation),
       num_threads_(options.num_threads),
       is_on_(options.readout.enabled && !camera.knows_readout),
-      next_look_(kFirstLook) {}
+      next_estimate_(kFirstEstimateFrames) {}
 
 void ReadoutDecision::Add(FrameId frame, SeenPoints points, const OdometryResult& result) {
   if (!is_on_) return;
   frames_.emplace(frame, std::move(points));
-  if (frames_.size() == next_look_) {
-    Look(result);
-    next_look_ *= kBetweenLooks;
+  if (frames_.size() == next_estimate_) {
+    Estimate(result);
+    next_estimate_ *= kEstimateFactor;
   }
   if (frames_.size() >= static_cast<std::size_t>(options_.max_frames)) is_on_ = false;
   if (!is_on_) frames_.clear();
 }
 
 void ReadoutDecision::Finish(const OdometryResult& result) {
-  // Little more than at the last look tells little more.
-  const std::size_t last_look = next_look_ > kFirstLook ? next_look_ / kBetweenLooks : 0;
-  if (is_on_ && frames_.size() > last_look + last_look / 2) Look(result);
+  // A last estimate is worth its time only with at least half as many frames again as the one
+  // before.
+  const std::size_t last_estimate =
+      next_estimate_ > kFirstEstimateFrames ? next_estimate_ / kEstimateFactor : 0;
+  if (is_on_ && frames_.size() > last_estimate + last_estimate / 2) Estimate(result);
 }
 
-void ReadoutDecision::Look(const OdometryResult& result) {
+void ReadoutDecision::Estimate(const OdometryResult& result) {
   const auto readout = EstimateReadout(
       camera_, frames_, result.graph, result.cam_from_world, relative_rotation_, num_threads_);
   if (!readout) return;

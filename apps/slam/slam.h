@@ -11,28 +11,29 @@
 
 namespace rotslam {
 
-/// What the system takes beside frames and a camera.
+/// Inputs of the system beside frames and a camera.
 struct SlamInputs : OrientationInputs {
-  // The camera is a guess (UncalibratedCamera): its focal length is found first.
+  // The camera is a guess (UncalibratedCamera); its focal length is estimated first.
   bool find_focal_length = false;
 };
 
 /// Orientations of every frame, and the map.
 struct SlamResult {
-  std::optional<FocalLengthEstimate> focal_length;  // set: it was sought
+  std::optional<FocalLengthEstimate> focal_length;  // set: it was estimated
   Orientations orientations;
-  MapResult map;  // has nothing where `orientations.interrupted`
+  MapResult map;  // empty where `orientations.interrupted`
 };
 
-/// The whole system: from frames and a calibrated camera to orientations, positions and points.
-/// Throws what FindOrientations throws. That there is no map is no error: see MapResult::failure.
+/// Runs the whole system, from frames and a calibrated camera to orientations, positions and
+/// points. Throws what FindOrientations throws. A sequence without a map is no error
+/// (MapResult::failure).
 SlamResult RunSlam(FrameSource& frames,
                    const Camera& camera,
                    const SlamOptions& options,
                    SlamObserver& observer,
                    const SlamInputs& inputs = {});
 
-/// The same with nobody watching.
+/// The same without an observer.
 SlamResult RunSlam(FrameSource& frames, const Camera& camera, const SlamOptions& options = {});
 
 }  // namespace rotslam

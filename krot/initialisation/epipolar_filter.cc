@@ -18,11 +18,11 @@ struct SharedTrack {
   ObservationIndex second;
   Eigen::Vector3d ray_a;  // world frame
   Eigen::Vector3d ray_b;
-  Eigen::Vector3d normal;  // ray_a x ray_b, as long as the sine of the parallax
+  Eigen::Vector3d normal;  // ray_a x ray_b; its length is the sine of the parallax
 };
 
-// By how much two rays miss a common plane with a direction; the smaller of the two ways to measure
-// it, so a ray near the epipole does not blow it up.
+// Distance of two rays from a common plane with a direction: the smaller of two measures, so that
+// it stays bounded near the epipole.
 struct Miss {
   double squared_volume;
   double squared_sine;  // of the ray's angle to the direction
@@ -77,7 +77,7 @@ Eigen::Vector3d VoteDirection(const std::vector<SharedTrack>& shared,
 
 using PairMap = std::map<std::pair<FrameId, FrameId>, std::vector<SharedTrack>>;
 
-// The pairs worth testing: for each view its later partners with most tracks in common.
+// Pairs to test: for each view the later views with the most common tracks.
 std::vector<std::pair<FrameId, FrameId>> ChoosePairs(const std::vector<Track>& tracks,
                                                      const EpipolarFilterOptions& options) {
   std::map<std::pair<FrameId, FrameId>, int> shared;
@@ -127,8 +127,8 @@ PairMap CollectShared(const RotationMap& cam_from_world,
   return pairs;
 }
 
-// Standard deviation of what the rays miss the planes by, from the median of its size. The
-// direction, good to the threshold so far, is fitted to those that agree closer and closer.
+// Robust standard deviation of the distances of the rays from the planes, from their median. The
+// direction is first refined with a decreasing threshold.
 double NoiseOf(const std::vector<SharedTrack>& shared,
                Eigen::Vector3d direction,
                double threshold) {
@@ -164,7 +164,7 @@ EpipolarVerdict TestEpipolarPlanes(const RotationMap& cam_from_world,
     const std::uint64_t seed = options.seed * 1000003u + pair_number++;
     if (static_cast<int>(shared.size()) < options.min_shared_tracks) continue;
     const Eigen::Vector3d direction = VoteDirection(shared, options, seed);
-    // A pair without a majority says nothing of its tracks.
+    // Pairs in which most tracks disagree are ignored.
     const int agreeing = CountInliers(shared, direction, options.threshold_rad);
     if (2 * agreeing < static_cast<int>(shared.size())) continue;
     for (const SharedTrack& track : shared) {

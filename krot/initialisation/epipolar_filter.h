@@ -19,27 +19,27 @@ struct EpipolarFilterOptions {
   std::uint64_t seed = 1;
 };
 
-/// An observation, as positions in the track list.
+/// An observation, by its indices in the list of tracks.
 struct ObservationIndex {
   int track = 0;
   int observation = 0;
   auto operator<=>(const ObservationIndex&) const = default;
 };
 
-/// What the pairs of views say.
+/// The result of the epipolar test.
 struct EpipolarVerdict {
-  // Observations that contradict the known rotations: off the epipolar plane in more of the tested
-  // pairs than on it.
+  // Observations that contradict the known rotations: they fail the test in more pairs than they
+  // pass.
   std::vector<ObservationIndex> outliers;
-  // By view, what its rays and those of others miss common planes by, rad, as a robust standard
-  // deviation: noise of two keypoints and errors of the rotations. Without views that have no pair
-  // with a majority.
+  // By view, robust standard deviation of the angles between its rays and the epipolar planes, rad.
+  // It includes the noise of two keypoints and errors of the rotations. Views without a pair in
+  // which most tracks agree are missing.
   std::map<FrameId, double> noise_rad;
 };
 
-/// Tests observations against the known rotations. The plane of a pair is spanned by a translation
-/// direction drawn from two tracks and voted by all. Zero baseline is harmless: rays then coincide
-/// and lie on every plane.
+/// Tests observations against the known rotations. For each pair of views a translation direction
+/// is sampled from two tracks and scored by all; it defines the epipolar planes. A zero baseline
+/// does no harm: rays then coincide and lie in every plane.
 EpipolarVerdict TestEpipolarPlanes(const RotationMap& cam_from_world,
                                    const std::vector<Track>& tracks,
                                    const EpipolarFilterOptions& options);

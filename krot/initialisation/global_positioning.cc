@@ -13,19 +13,19 @@
 namespace rotslam {
 namespace {
 
-// While little is in its place most has to pull.
+// Scale of the loss at the start, rad: large, because initial errors are.
 constexpr double kFirstLossRad = 0.1;
 constexpr int kMaxSteps = 200;
-// A loss has done its work after so many steps that gain less than this share of the cost. It takes
-// small ones to move long chains: with 1e-3 the positions along a street with one outlier in three
-// are twenty times as far off.
+// The loss is reduced after kSmallGains steps with a relative gain below this. Long chains converge
+// slowly: at 1e-3 the positions along a street with one outlier in three are twenty times less
+// accurate.
 constexpr double kLeastGain = 1e-5;
 constexpr int kSmallGains = 3;
-// Damping of the depths, in units of their own curvature.
+// Damping of the depths relative to their curvature: start and bounds.
 constexpr double kFirstDamping = 1.0;
 constexpr double kMinDamping = 1e-6;
 constexpr double kMaxDamping = 1e8;
-// A depth changes by this factor at most in one step, and so stays positive.
+// Largest factor by which a step changes a depth, which keeps depths positive.
 constexpr double kMaxDepthFactor = 10.0;
 
 class GlobalPositioning {
@@ -66,13 +66,13 @@ class GlobalPositioning {
     return x.segment<3>(layout_.Center(view));
   }
 
-  // From the centre to the point of an observation.
+  // Vector from the centre to the point of an observation.
   Eigen::Vector3d Between(const Eigen::VectorXd& x, int o) const {
     const ImageObservation& observation = problem_.observations[o];
     return x.segment<3>(layout_.Point(observation.point)) - Center(x, observation.view);
   }
 
-  // Adds `g` to the right hand side where an observation's point has it, -g where its centre has.
+  // Adds `g` to the right-hand side at an observation's point, and subtracts it at its centre.
   void AddGradient(int o, const Eigen::Vector3d& g, Eigen::VectorXd& b) const {
     const ImageObservation& observation = problem_.observations[o];
     b.segment<3>(layout_.Point(observation.point)) += g;
@@ -96,7 +96,7 @@ class GlobalPositioning {
     return root * root;
   }
 
-  // Half the squares, with Geman and McClure's loss.
+  // Half the sum of squares with the Geman-McClure loss.
   double Cost(const Eigen::VectorXd& x, const std::vector<double>& inverse_depths) const {
     double cost = 0.0;
     for (int o = 0; o < num_observations(); ++o) {
@@ -106,7 +106,7 @@ class GlobalPositioning {
     return cost;
   }
 
-  // Levenberg and Marquardt's method for one loss, damped after Nielsen's rule. False when a system
+  // Levenberg-Marquardt for one scale of the loss, with Nielsen's damping rule. False when a system
   // cannot be solved.
   bool Minimise() {
     double cost = Cost(x_, inverse_depths_);
@@ -135,9 +135,9 @@ class GlobalPositioning {
     return true;
   }
 
-  // What minimises the squares of v - s (X - c), linear in the changes of s, X and c, and weighted
-  // by the loss, plus `damping` times the squares of what (X - c) ds moves. With ds eliminated an
-  // observation leaves w s^2 (I - y y^T / ((1 + damping) y^T y)) between X and c, y = X - c.
+  // Minimises the squares of v - s (X - c), linearised in s, X and c and weighted by the loss, plus
+  // `damping` times the squares of (X - c) ds. With ds eliminated an observation contributes w s^2
+  // (I - y y^T / ((1 + damping) y^T y)) between X and c, with y = X - c.
   std::optional<Step> FindStep(double damping) {
     Eigen::VectorXd b = Eigen::VectorXd::Zero(layout_.size());
     for (int o = 0; o < num_observations(); ++o) {
@@ -184,7 +184,7 @@ class GlobalPositioning {
   }
 
   const MinimaxProblem& problem_;
-  double loss_ = 0.0;  // at present
+  double loss_ = 0.0;  // present scale of the loss, rad
   StructureSystem system_;
   StructureLayout layout_;
   std::vector<Eigen::Vector3d> rays_;   // unit, world axes, by observation

@@ -7,25 +7,25 @@
 namespace rotslam {
 namespace {
 
-class Growth {
+class Registration {
  public:
-  Growth(const RotationMap& cam_from_world,
-         const std::vector<Track>& tracks,
-         const RegistrationOptions& options,
-         CenterMap& centers)
+  Registration(const RotationMap& cam_from_world,
+               const std::vector<Track>& tracks,
+               const RegistrationOptions& options,
+               CenterMap& centers)
       : cam_from_world_(cam_from_world),
         tracks_(tracks),
         options_(options),
         centers_(centers),
         points_(tracks.size()),
-        num_placed_(tracks.size(), 0) {
+        num_registered_(tracks.size(), 0) {
     for (int t = 0; t < static_cast<int>(tracks.size()); ++t) {
       for (int o = 0; o < static_cast<int>(tracks[t].observations.size()); ++o) {
         const FrameId frame = tracks[t].observations[o].frame;
         sights_of_[frame].push_back({t, o});
-        if (centers_.contains(frame)) ++num_placed_[t];
+        if (centers_.contains(frame)) ++num_registered_[t];
       }
-      if (num_placed_[t] >= 2) Intersect(t);
+      if (num_registered_[t] >= 2) Intersect(t);
     }
   }
 
@@ -37,7 +37,7 @@ class Growth {
     return count;
   }
 
-  bool Place(FrameId view) {
+  bool Register(FrameId view) {
     const Rotation world_from_cam = cam_from_world_.at(view).Inverse();
     std::vector<RayToPoint> rays;
     for (const Sight& sight : sights_of_.at(view)) {
@@ -53,9 +53,10 @@ class Growth {
     }
     centers_[view] = resection->center_in_world;
     for (const Sight& sight : sights_of_.at(view)) {
-      const int placed = ++num_placed_[sight.track];
+      const int placed = ++num_registered_[sight.track];
       if (placed < 2) continue;
-      // Known points are intersected anew when their sightings have grown by half.
+      // Known points are triangulated again after every new view up to four, then at powers of two
+      // and multiples of twelve.
       if (!points_[sight.track] || placed <= 4 || (placed & (placed - 1)) == 0 ||
           placed % 12 == 0) {
         Intersect(sight.track);
@@ -83,21 +84,22 @@ class Growth {
   const RegistrationOptions& options_;
   CenterMap& centers_;
   std::vector<std::optional<Eigen::Vector3d>> points_;
-  std::vector<int> num_placed_;
+  std::vector<int> num_registered_;
   std::map<FrameId, std::vector<Sight>> sights_of_;
 };
 
-// First view in order with points enough, else the one with most, else none.
-std::optional<std::size_t> NextView(const Growth& growth,
-                                    const std::vector<FrameId>& waiting,
+// The first view in order with five times min_points known points, else the one with the most, at
+// least min_points.
+std::optional<std::size_t> NextView(const Registration& registration,
+                                    const std::vector<FrameId>& remaining,
                                     const std::vector<bool>& failed,
                                     int min_points) {
-  constexpr int kPlenty = 5;  // times min_points
+  constexpr int kPlenty = 5;  // times min_points: accurate enough to keep the order
   std::optional<std::size_t> best;
   int most = min_points - 1;
-  for (std::size_t k = 0; k < waiting.size(); ++k) {
+  for (std::size_t k = 0; k < remaining.size(); ++k) {
     if (failed[k]) continue;
-    const int known = growth.NumKnownPoints(waiting[k]);
+    const int known = registration.NumKnownPoints(remaining[k]);
     if (known >= kPlenty * min_points) return k;
     if (known <= most) continue;
     most = known;
@@ -131,22 +133,22 @@ std::vector<FrameId> RegisterViews(const RotationMap& cam_from_world,
                                    const std::vector<FrameId>& order,
                                    const RegistrationOptions& options,
                                    CenterMap& centers) {
-  std::vector<FrameId> waiting;
+  std::vector<FrameId> remaining;
   for (const FrameId view : order) {
-    if (!centers.contains(view)) waiting.push_back(view);
+    if (!centers.contains(view)) remaining.push_back(view);
   }
-  if (waiting.empty()) return waiting;
-  Growth growth(cam_from_world, tracks, options, centers);
-  std::vector<bool> failed(waiting.size(), false);
-  while (const auto next = NextView(growth, waiting, failed, options.min_points)) {
-    if (growth.Place(waiting[*next])) {
-      waiting.erase(waiting.begin() + static_cast<std::ptrdiff_t>(*next));
-      failed.assign(waiting.size(), false);  // new points may help those that failed
+  if (remaining.empty()) return remaining;
+  Registration registration(cam_from_world, tracks, options, centers);
+  std::vector<bool> failed(remaining.size(), false);
+  while (const auto next = NextView(registration, remaining, failed, options.min_points)) {
+    if (registration.Register(remaining[*next])) {
+      remaining.erase(remaining.begin() + static_cast<std::ptrdiff_t>(*next));
+      failed.assign(remaining.size(), false);  // new points may help those that failed
     } else {
       failed[*next] = true;
     }
   }
-  return waiting;
+  return remaining;
 }
 
 }  // namespace rotslam

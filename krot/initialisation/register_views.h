@@ -19,20 +19,20 @@ struct RegistrationOptions {
   double threshold_rad = 0.0114;  // bearing error of a point's observations; 8 px at f = 700
 };
 
-/// Resection-intersection: places views one by one from the points known so far, then intersects
-/// the tracks each one completes.
-/// @param order    views wanted, in the order to try; a view that cannot be placed yet waits, and
-///                 when the order fails the view with most known points goes first.
-/// @param centers  centres known at the start; grows.
-/// @return  views that could not be placed, in the order given.
+/// Resection-intersection: registers views one by one from the points known so far, then
+/// triangulates the tracks that each of them completes.
+/// @param order  views to register, in order of preference. A view with too few known points is
+///               deferred, and the view with the most known points comes first instead.
+/// @param centers  known centres; receives the new ones.
+/// @return  views that could not be registered, in the order given.
 std::vector<FrameId> RegisterViews(const RotationMap& cam_from_world,
                                    const std::vector<Track>& tracks,
                                    const std::vector<FrameId>& order,
                                    const RegistrationOptions& options,
                                    CenterMap& centers);
 
-/// The track's sightings by views with a centre; `observations` receives their positions in the
-/// track when given.
+/// Sightings of a track by views with a centre. If `observations` is not null, it receives their
+/// indices in the track.
 std::vector<Sighting> PlacedSightings(const RotationMap& cam_from_world,
                                       const CenterMap& centers,
                                       const Track& track,

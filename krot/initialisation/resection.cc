@@ -11,7 +11,7 @@
 namespace rotslam {
 namespace {
 
-// A centre that sees known points is a "point seen" along the reversed rays from them.
+// Resection of a centre is triangulation of a point along the reversed rays from the known points.
 Sighting Reversed(const RayToPoint& ray, double sigma) {
   return {Rotation(), ray.point_in_world, -ray.ray_in_world, sigma};
 }
@@ -44,7 +44,7 @@ std::optional<Eigen::Vector3d> Midpoint(const RayToPoint& a, const RayToPoint& b
   return 0.5 * (a.point_in_world + s * a.ray_in_world + b.point_in_world + t * b.ray_in_world);
 }
 
-// Weighted least squares on the sphere, weights falling with the error of the round before.
+// Re-weighted least squares of angles.
 std::optional<Eigen::Vector3d> Refine(const std::vector<RayToPoint>& rays,
                                       const std::vector<int>& inliers,
                                       Eigen::Vector3d center,
@@ -83,7 +83,7 @@ std::optional<Resection> ResectCenter(const std::vector<RayToPoint>& rays,
     if (inliers.size() <= best.size()) continue;
     best = std::move(inliers);
     best_center = *center;
-    // Enough draws to have met a pair of inliers with probability 1 - 1e-6.
+    // Number of samples that contain a pair of inliers with probability 1 - 1e-6.
     const double share = static_cast<double>(best.size()) / count;
     const double miss = std::log(std::max(1e-12, 1.0 - share * share));
     needed = std::min(options.max_samples, std::max(20, static_cast<int>(-13.8 / miss) + 1));

@@ -8,14 +8,14 @@
 
 namespace rotslam {
 
-/// A known point and the direction in which the view sees it.
+/// A known point and the ray to it from the unknown centre.
 struct RayToPoint {
   Eigen::Vector3d point_in_world;
   Eigen::Vector3d ray_in_world;  // unit, from the unknown centre
 };
 
-// Not ba's ResectionOptions: both live in namespace rotslam, where a name has one meaning.
-/// Of one camera centre from known points.
+// The name differs from ba's ResectionOptions, since both are in namespace rotslam.
+/// Options for the resection of a camera centre.
 struct CenterResectionOptions {
   double threshold_rad = 0.0057;  // inlier angle; 4 px at f = 700
   int max_samples = 200;
@@ -27,10 +27,10 @@ struct Resection {
   std::vector<int> inliers;  // positions in the input
 };
 
-/// Camera centre from known points seen under a known rotation: the centre lies on the line through
-/// each point along its ray, d x (X - c) = 0, linear in c. Pairs of lines drawn at random propose,
-/// all lines vote, robust least squares on the sphere finishes.
-/// @return  nullopt when fewer than three lines agree or they leave the centre open.
+/// Camera centre from known points and a known rotation. The centre lies on the line through each
+/// point along its ray: d x (X - c) = 0, linear in c. Hypotheses come from random pairs of lines
+/// and are scored by all lines; the best is refined by robust least squares of angles.
+/// @return  nullopt when fewer than three lines agree or they do not determine the centre.
 /// Error:   exact on exact input (1e-9 of the scene's size).
 std::optional<Resection> ResectCenter(const std::vector<RayToPoint>& rays,
                                       const CenterResectionOptions& options);

@@ -10,13 +10,13 @@
 namespace rotslam {
 namespace {
 
-// The next round's price of one observation.
+// Weight of one observation in the next round.
 double NextWeight(const MinimaxProblem& problem,
                   const MinimaxStructure& structure,
                   const ImageObservation& observation,
                   double residual,
                   double gamma) {
-  constexpr double kFloor = 1e-6;  // an observation behind its camera costs next to nothing
+  constexpr double kFloor = 1e-6;  // weight of an observation behind its camera
   if (residual == kInfinity) return kFloor;
   const double depth = problem.R_c_w[observation.view].row(2).dot(
       structure.point_in_world[observation.point] - structure.center_in_world[observation.view]);
@@ -35,8 +35,8 @@ std::vector<double> NextWeights(const MinimaxProblem& problem,
   return weights;
 }
 
-// @param given   where fixed views and points are.
-// @param before  the answer to the program before.
+// @param given  values of fixed views and points.
+// @param before  solution of the previous program.
 MinimaxLpResult SolveProgram(const MinimaxProblem& problem,
                              double gamma,
                              const std::vector<double>& weights,
@@ -44,7 +44,8 @@ MinimaxLpResult SolveProgram(const MinimaxProblem& problem,
                              double tolerance,
                              const MinimaxStructure* given,
                              const MinimaxStructure* before) {
-  // Half the iterations of one that starts from nothing (L1InteriorOptions).
+  // First product of slack and multiplier for a start from the previous solution; halves the
+  // iterations (L1InteriorOptions).
   constexpr double kFirstProductNearby = 1e-3;
   if (options.method == "interior" || given != nullptr) {
     L1InteriorOptions interior;
@@ -57,14 +58,14 @@ MinimaxLpResult SolveProgram(const MinimaxProblem& problem,
   return SolveL1Slack(problem, gamma, options.depth_price, weights, options.lp);
 }
 
-// One program; false leaves the answer of the one before.
+// Solves one program. Where it fails, returns false and keeps the previous solution.
 bool SolveRound(const MinimaxProblem& problem,
                 double gamma,
                 const std::vector<double>& weights,
                 const RobustStartOptions& options,
                 const MinimaxStructure* given,
                 RobustStart& start) {
-  // The rounds' answers only set prices.
+  // Solutions of the rounds only determine weights, so a coarse tolerance is enough.
   const double tolerance = gamma > 0.0 ? 1e-3 : 1e-6;
   const MinimaxStructure* const before =
       start.call == LpCallStatus::kCompleted ? &start.structure : nullptr;
@@ -106,7 +107,7 @@ RobustStart SolveRobustStart(const MinimaxProblem& problem,
   for (bool done = false; !done && start.num_programs < options.max_rounds;) {
     if (!SolveRound(problem, gamma, weights, options, given, start)) return start;
     weights = NextWeights(problem, start, gamma);
-    // Where nobody pays, no price matters.
+    // Without outliers the weights have no effect.
     done = *std::max_element(start.residuals.begin(), start.residuals.end()) <= 1.01 * gamma;
   }
   if (options.use_sharpening) SolveRound(problem, 0.0, weights, options, given, start);

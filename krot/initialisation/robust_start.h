@@ -45,11 +45,10 @@ struct RobustStart {
   int num_programs = 0;
 };
 
-/// Structure that misses the bound `gamma` by the least sum, outliers priced down in rounds by
-/// 1 / ((1 + (excess / gamma)^2) depth).
-/// @param start  where the problem's fixed views and points are, when it has any (its smallest
-/// depth
-///               must then be well above one): only "interior" programs hold them.
+/// Finds the structure with the least sum of slacks over the bound `gamma`. Outliers are
+/// down-weighted in rounds by 1 / ((1 + (excess / gamma)^2) depth).
+/// @param start  values of fixed views and points, required when the problem has any. Its smallest
+///               depth must be well above one, and the method is then always "interior".
 /// Source:  Candes, Wakin & Boyd, Enhancing sparsity by reweighted l1 minimization, 2008; ours
 ///          squares the excess and divides by depth, since slack is counted at depth, and ends
 ///          with one program without the bound.

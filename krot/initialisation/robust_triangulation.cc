@@ -44,7 +44,7 @@ std::optional<RobustPoint> TriangulateRobustly(const std::vector<Sighting>& sigh
   propose(0, count - 1);
   propose(0, count / 2);
   propose(count / 2, count - 1);
-  // Every pair of a short track, fifteen of a long one.
+  // All pairs of a short track, fifteen pairs of a long one.
   if (count <= 6) {
     for (int a = 0; a < count; ++a) {
       for (int b = a + 1; b < count; ++b) propose(a, b);

@@ -7,16 +7,16 @@
 
 namespace rotslam {
 
-/// A triangulated point and who agrees with it.
+/// A triangulated point and its inliers.
 struct RobustPoint {
   Eigen::Vector3d point_in_world;
   std::vector<int> inliers;  // positions in the sightings, ascending
 };
 
-/// Point from sightings of which some are wrong: all of them first, then pairs, the largest
-/// agreement wins and is refitted.
-/// @return  nullopt when fewer than two agree to `threshold_rad` in front of their cameras under at
-///          least `min_angle_rad` of parallax, or when they are not the majority.
+/// Triangulates a point from sightings with outliers: from all of them first, then from pairs. The
+/// hypothesis with the most inliers is refined on these.
+/// @return  nullopt when fewer than two sightings agree to `threshold_rad` in front of their
+///          cameras with at least `min_angle_rad` of parallax, or when they are not the majority.
 std::optional<RobustPoint> TriangulateRobustly(const std::vector<Sighting>& sightings,
                                                double min_angle_rad,
                                                double threshold_rad);

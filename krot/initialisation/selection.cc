@@ -14,7 +14,7 @@ struct Candidate {
   Eigen::Vector2d xy;
 };
 
-// Cells of one view in row order, each with its tracks best first.
+// Cells of one view in row order, each with its tracks in order of rank.
 std::vector<std::vector<int>> SortIntoCells(const std::vector<Candidate>& candidates,
                                             const std::vector<int>& rank,
                                             const SelectionOptions& options) {
@@ -39,7 +39,7 @@ std::vector<std::vector<int>> SortIntoCells(const std::vector<Candidate>& candid
   return cells;
 }
 
-// Position of each track in the order (parallax enough, longer, earlier).
+// Rank of each track: enough parallax first, then longer, then earlier.
 std::vector<int> RankTracks(const RotationMap& cam_from_world,
                             const std::vector<Track>& tracks,
                             const SelectionOptions& options) {
@@ -72,7 +72,7 @@ std::vector<int> SelectTracks(const RotationMap& cam_from_world,
   std::map<FrameId, int> count;
   for (const auto& [view, candidates] : candidates_of) {
     const auto cells = SortIntoCells(candidates, rank, options);
-    // Round by round the next best of every cell.
+    // Each round takes the next track of every cell.
     bool left = true;
     for (std::size_t round = 0; left && count[view] < options.observations_per_view; ++round) {
       left = false;

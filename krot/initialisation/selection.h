@@ -20,13 +20,14 @@ struct SelectionOptions {
   int grid_rows = 5;
 };
 
-/// Positions in `tracks` of a subset that covers every view's image evenly, long tracks with
-/// parallax first; ascending. Depends on the tracks' order only in ties.
+/// Selects tracks that cover the image of every view evenly, long tracks with parallax first.
+/// Returns their indices in `tracks`, ascending. The order of the tracks matters only between equal
+/// ones.
 std::vector<int> SelectTracks(const RotationMap& cam_from_world,
                               const std::vector<Track>& tracks,
                               const SelectionOptions& options);
 
-/// Tracks cut to the observations that fulfil `keep`; those left with fewer than two are dropped.
+/// Restricts tracks to the observations that fulfil `keep`; tracks with fewer than two are dropped.
 template <class Keep>
 std::vector<Track> RestrictTracks(const std::vector<Track>& tracks, const Keep& keep) {
   std::vector<Track> result;

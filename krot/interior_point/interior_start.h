@@ -13,12 +13,12 @@ double Complementarity(const Iterate& at) {
   return sum;
 }
 
-/// The first slack s, rows r and multipliers y at a point that `at` has already: every row has
-/// room, every product y r is the same, and sum sigma_k y_k is one.
-/// @param program      has size(), the number of observations, and Sigma(o), by how much s relaxes
-///                     each row of one.
-/// @param margin       room of the row with the least, in units of s.
-/// @param update_rows  sets the rows at a point and its s.
+/// Sets the first slack s, rows r and multipliers y at a point that is set in `at`: all rows are
+/// positive, all products y r are equal, and sum sigma_k y_k is one.
+/// @param program  has size(), the number of observations, and Sigma(o), the coefficients of s in
+///                 the rows of one observation.
+/// @param margin  smallest value of a row, in units of s.
+/// @param update_rows  computes the rows at a point and its s.
 template <typename Program, typename Iterate, typename UpdateRows>
 void StartRows(const Program& program, double margin, const UpdateRows& update_rows, Iterate& at) {
   at.y.resize(program.size());

@@ -14,8 +14,8 @@
 namespace rotslam {
 namespace {
 
-// The program: min p . s  s.t.  A x - s + r = b,  s >= 0,  r >= 0, with multipliers y of the rows
-// that belong to r and z = p - y to s; at the optimum A^T y = 0, y r = 0, z s = 0.
+// The program: min p . s  s.t.  A x - s + r = b,  s >= 0,  r >= 0, with multipliers y of r and z =
+// p - y of s; at the optimum A^T y = 0, y r = 0, z s = 0.
 class Program : public HalfSpaces {
  public:
   Program(const MinimaxProblem& problem,
@@ -45,7 +45,7 @@ class Program : public HalfSpaces {
 struct Iterate {
   Eigen::VectorXd x;
   Fives r, s, y, z;
-  double imbalance = 1.0;  // A^T y, as a share of the first one
+  double imbalance = 1.0;  // norm of A^T y relative to the first one
 };
 
 struct Step {
@@ -53,12 +53,12 @@ struct Step {
   Fives r, s, y, z;
 };
 
-// Products aimed at: y r and z s.
+// Target products y r and z s.
 struct Products {
   Fives yr, zs;
 };
 
-// First iterate at `x`: exactly central, y r = z s = mu.
+// First iterate at `x`, exactly central: y r = z s = mu.
 Iterate Start(const Program& program, Eigen::VectorXd x, double mu) {
   Iterate at;
   at.x = std::move(x);
@@ -113,7 +113,7 @@ class NewtonSystem {
   // A^T y, zero when dual feasible.
   const Eigen::VectorXd& imbalance() const { return imbalance_; }
 
-  // The step that changes the products by `change` to first order, and ends the imbalance when
+  // The step that changes the products by `change` to first order, and makes A^T y zero when
   // `with_imbalance`.
   Step Solve(const Products& change, bool with_imbalance) const {
     Eigen::VectorXd right =
@@ -147,7 +147,8 @@ class NewtonSystem {
     return product;
   }
 
-  // One step of iterative refinement: the factor's matrix sums over rows of very different weights.
+  // One step of iterative refinement, since the factored matrix sums rows of very different
+  // weights.
   Eigen::VectorXd Inverse(const Eigen::VectorXd& b, bool refine) const {
     Eigen::VectorXd x = system_.Solve(S_, b);
     if (refine) x += system_.Solve(S_, b - Multiply(x));
@@ -172,7 +173,7 @@ void Advance(const Program& program, const Step& step, double primal, double dua
   at.x += primal * step.x;
   for (int o = 0; o < program.size(); ++o) {
     at.r[o] += primal * step.r[o];
-    // The row decides the larger of the two, so that rounding does not pile up.
+    // The larger of s and r follows from the row, so that rounding errors do not accumulate.
     at.s[o] += primal * step.s[o];
     const Five room = program.Room(o, at.x);
     const Five from_s = at.s[o] + room;
@@ -193,7 +194,7 @@ bool Finite(const Step& step) {
   return std::all_of(step.y.begin(), step.y.end(), [](const Five& y) { return y.allFinite(); });
 }
 
-// What moves the products after a step of that length back towards `mu`.
+// Change that moves the products after a step of that length towards `mu`.
 Products Recentring(const Iterate& at, const Step& step, const Reach& length, double mu) {
   const auto [primal, dual] = length;
   Products change{Fives(at.r.size()), Fives(at.r.size())};
@@ -214,10 +215,11 @@ void AddTo(const Step& other, Step& step) {
   }
 }
 
-// Mehrotra's centring and correction, then Gondzio's recentring while it lengthens the step.
+// Mehrotra's centring and correction, then Gondzio's recentring while it increases the step length.
 bool NewtonStep(const Program& program, StructureSystem& system, Iterate& at) {
   constexpr int kMaxRecentrings = 4;
-  // Mehrotra's 3 is for steps that nothing lengthens: half as many steps again on a street.
+  // Exponent of the centring parameter. Mehrotra's 3 suits steps without recentring; with it the
+  // number of iterations is smaller at 12.
   constexpr double kGreed = 12.0;
   const NewtonSystem newton(program, at, system);
   if (!newton.usable()) return false;

@@ -18,15 +18,15 @@ struct L1InteriorOptions {
   double first_product = 10.0;
 };
 
-/// SolveL1Slack by an interior-point method of our own, which eliminates the slacks and points and
-/// factors the centres' system.
-/// @param weights  price of each observation's slack, positive; empty: all one.
-/// @param start    first iterate, and where the problem's fixed views and points are: needed when
-///                 it has any. The smallest depth asked for is one in its scale, too.
+/// Solves the program of SolveL1Slack by a specialised interior-point method, which eliminates the
+/// slacks and points and factors the centres' system.
+/// @param weights  weight of each observation's slack, positive; empty: all one.
+/// @param start  first iterate and the values of fixed views and points; required when there are
+///               any. The bound of one on the smallest depth applies to its scale as well.
 /// @return  kCompleted when the tolerance was reached. Multipliers are those of the last iterate.
 ///          Throws std::invalid_argument as SolveL1Slack does.
-/// Cost:    20 to 60 iterations of a StructureSystem, up to 150 for some long ways, 10 to 20 from a
-///          good start.
+/// Cost:    20 to 60 iterations of a StructureSystem, up to 150 for some long paths, 10 to 20 from
+///          a good start.
 /// Source:  Mehrotra, On the implementation of a primal-dual interior point method, SIAM J. Opt.
 ///          1992, for variables with an upper bound.
 MinimaxLpResult SolveL1SlackInterior(const MinimaxProblem& problem,

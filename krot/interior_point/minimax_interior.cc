@@ -16,7 +16,7 @@
 namespace rotslam {
 namespace {
 
-// What a program takes from its reference, by observation.
+// Depths of the reference, by observation.
 struct ReferenceDepths {
   std::vector<double> typical;  // depth_o: units of slack and of the mean
   std::vector<double> floor;    // least depths
@@ -57,7 +57,7 @@ class Program : public HalfSpaces {
 struct Iterate {
   Eigen::VectorXd x;
   double s = 0.0;
-  double nu = 0.0;  // price of the mean
+  double nu = 0.0;  // multiplier of the mean
   Fives y;
   Fives r;
 };
@@ -78,7 +78,7 @@ void UpdateRows(const Program& program, Iterate& at) {
   }
 }
 
-// First iterate at `x`: slack with room, every product y r the same.
+// First iterate at `x`: positive slack, all products y r equal.
 Iterate Start(const Program& program, const Eigen::VectorXd& x, double margin) {
   Iterate at;
   at.x = x;
@@ -153,7 +153,8 @@ class NewtonSystem {
   }
 
  private:
-  // H x with H = A^T D A row by row, without the sums over rows that the factor is made of.
+  // H x with H = A^T D A, row by row, which is more accurate than the assembled matrix of the
+  // factor.
   Eigen::VectorXd Multiply(const Eigen::VectorXd& x) const {
     Eigen::VectorXd product = Eigen::VectorXd::Zero(x.size());
     for (int o = 0; o < program_.size(); ++o) {
@@ -163,7 +164,8 @@ class NewtonSystem {
     return product;
   }
 
-  // H^-1 b; where round-off has grown, by conjugate gradients preconditioned with the factor.
+  // H^-1 b; with conjugate gradients, preconditioned by the factor, once rounding errors have
+  // grown.
   Eigen::VectorXd Inverse(const Eigen::VectorXd& b) const {
     constexpr int kMaxSteps = 10;
     constexpr double kAccuracy = 1e-12;
@@ -209,7 +211,7 @@ void Advance(const Program& program, const Step& step, double primal, double dua
   const Fives before = at.r;
   UpdateRows(program, at);
   for (int o = 0; o < program.size(); ++o) {
-    // Rounding must not carry an active row across.
+    // Rounding must not make an active row negative.
     at.r[o] = at.r[o].max(1e-3 * before[o].min(before[o] + primal * step.r[o]));
     at.y[o] += dual * step.y[o];
   }
@@ -219,7 +221,7 @@ Reach ReachOf(const Iterate& at, const Step& step) {
   return {StepToBoundary(at.r, step.r), StepToBoundary(at.y, step.y)};
 }
 
-// What moves the products after a step of that length back towards `mu`.
+// Change that moves the products after a step of that length towards `mu`.
 Fives Recentring(const Iterate& at, const Step& step, const Reach& length, double mu) {
   Fives change(at.r.size());
   for (std::size_t o = 0; o < at.r.size(); ++o) {
@@ -247,11 +249,11 @@ bool Finite(const Step& step) {
   return true;
 }
 
-// What is left of dual feasibility, as a bound on what it changes of the objective.
+// Dual infeasibility, as a bound on its effect on the objective.
 struct Accuracy {
   double dual_error = kInfinity;
-  double expected = kInfinity;  // by the last step, were it exact
-  bool refine = false;          // steps are no longer exact enough
+  double expected = kInfinity;  // after the last step in exact arithmetic
+  bool refine = false;          // steps need conjugate gradients
 
   void Update(double error, double gap) {
     dual_error = error;
@@ -259,7 +261,7 @@ struct Accuracy {
   }
 };
 
-// Mehrotra's centring and correction, then Gondzio's recentring while it lengthens the step.
+// Mehrotra's centring and correction, then Gondzio's recentring while it increases the step length.
 bool NewtonStep(const Program& program, StructureSystem& system, Iterate& at, Accuracy& accuracy) {
   constexpr int kMaxRecentrings = 2;
   const NewtonSystem newton(program, at, system, accuracy.refine);
@@ -299,7 +301,7 @@ bool NewtonStep(const Program& program, StructureSystem& system, Iterate& at, Ac
   return true;
 }
 
-// With the mean's price spread over the depth bounds: the multipliers of the cone alone.
+// Multipliers of the half-spaces alone: that of the mean is distributed over the depth bounds.
 std::vector<double> ConeMultipliers(const Program& program, const Iterate& at) {
   std::vector<double> multipliers;
   multipliers.reserve(5 * at.y.size());
@@ -316,16 +318,17 @@ double DualObjective(const Program& program, const Iterate& at) {
   return objective;
 }
 
-// Depths of points that `reference` misses by far are no guide: centres a little wrong can bring
-// such a point close to one of them, and with a depth 40 times too small its slack would cost 40
-// times as much. They count as a third of the view's median at least and may shrink as they like.
+// Depths of the reference. Those of points with large residuals are unreliable: small errors of the
+// centres may bring such a point close to a centre, and with a depth 40 times too small its slack
+// would have 40 times the weight. They count as at least a third of the view's median, and their
+// lower bound is loose.
 ReferenceDepths TakeDepths(const MinimaxProblem& problem,
                            const MinimaxStructure& reference,
                            double gamma,
                            double depth_floor) {
-  constexpr double kFar = 1.5;  // gammas
-  constexpr double kShareOfMedian = 0.3;
-  constexpr double kLooseFloor = 0.02;
+  constexpr double kFar = 1.5;            // residual in units of gamma
+  constexpr double kShareOfMedian = 0.3;  // of the view's depths
+  constexpr double kLooseFloor = 0.02;    // instead of InteriorOptions::depth_floor
   ReferenceDepths depths;
   depths.typical.reserve(problem.observations.size());
   depths.floor.reserve(problem.observations.size());
@@ -384,7 +387,7 @@ InteriorResult MinimaxInterior::Solve(double gamma,
       result.converged = true;
       break;
     }
-    // Nothing left to gain: round-off keeps the iterate from being dual feasible.
+    // The gap is closed; only rounding keeps the iterate from being dual feasible.
     if (gap <= 0.01 * enough) break;
   }
   result.structure = Unpacked(program.layout(), at.x);

@@ -22,14 +22,14 @@ struct InteriorOptions {
   int max_iterations = 60;
 };
 
-/// What an interior-point program gave. Claims only: MaxBoxResidual of the structure and
-/// CertifiesInfeasible of the multipliers are the proofs.
+/// The result of an interior-point program. It is not verified: use MaxBoxResidual for the
+/// structure and CertifiesInfeasible for the multipliers.
 struct InteriorResult {
   bool converged = false;
   MinimaxStructure structure;       // the last iterate
   std::vector<double> multipliers;  // 5 per observation as in MinimaxLpResult
   double slack = 0.0;               // of the last iterate
-  double slack_bound = 0.0;         // below the least slack when dual feasible
+  double slack_bound = 0.0;         // lower bound of the slack when dual feasible
   int iterations = 0;
 };
 
@@ -37,11 +37,11 @@ struct InteriorResult {
 ///   min s  s.t.  a_k . (X - c) <= s depth_o (k < 4),  d >= depth_floor depth_o,  mean(d / depth_o)
 ///   = 1
 /// over all observations o, with the half-space normals a_k at `gamma` and depth_o the depths d of
-/// a reference structure. Slack counts in units of the residual, so gamma + s predicts the optimum
-/// and the program at gamma = residual of the reference is a step of Dinkelbach's method in the
-/// form that converges superlinearly; s > 0 proves gamma infeasible through the multipliers. The
-/// mean, held from both sides, keeps the central path bounded where points at infinity would drag
-/// a program without it away.
+/// a reference structure. The unit of the slack is that of the residual, so gamma + s predicts the
+/// optimum. The program at gamma = residual of the reference is a step of Dinkelbach's method in
+/// the form that converges superlinearly; s > 0 proves gamma infeasible by the multipliers. The
+/// bounds on the mean from both sides keep the central path bounded, which points at infinity would
+/// otherwise prevent.
 /// Source:  Mehrotra, On the implementation of a primal-dual interior point method, SIAM J. Opt.
 ///          1992; Crouzeix, Ferland & Schaible, A note on an algorithm for generalized fractional
 ///          programs, JOTA 1986.
@@ -50,14 +50,14 @@ class MinimaxInterior {
   /// Keeps a reference to `problem`.
   explicit MinimaxInterior(const MinimaxProblem& problem);
 
-  /// @param reference  the first iterate as well. Where it has depths that are not positive, depth
-  ///                   bounds get slack too until they are.
+  /// @param reference  also the first iterate. Where it has depths that are not positive, depth
+  ///                   bounds have slack as well until they are.
   InteriorResult Solve(double gamma,
                        const MinimaxStructure& reference,
                        const InteriorOptions& options);
 
-  /// The same without a reference, as if all depths were one. Ends as soon as they are positive and
-  /// the residuals within 2 gamma.
+  /// The same without a reference: all depth_o are one. Ends as soon as all depths are positive and
+  /// all residuals are within 2 gamma.
   InteriorResult FindFeasible(double gamma, const InteriorOptions& options);
 
  private:

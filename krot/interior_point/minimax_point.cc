@@ -14,7 +14,7 @@ namespace {
 using Six = Eigen::Array<double, 6, 1>;
 using Sixes = std::vector<Six>;
 
-// Bounds on the depths, in units of the reference's: a program moves a point no further.
+// Bounds on the depths of one program, in units of the reference depths.
 constexpr double kNearest = 0.1;
 constexpr double kFarthest = 10.0;
 
@@ -231,7 +231,7 @@ class PointSearch {
     best_.position = u;
   }
 
-  // Solves the program at `gamma` around the best position; the next gamma to try.
+  // Solves the program at `gamma` around the best position. Returns the next gamma.
   double Improve(double gamma) {
     std::vector<double> depths;
     depths.reserve(observations_.size());
@@ -250,7 +250,7 @@ class PointSearch {
     if (at.s > 0.0) {
       const bool proven = gamma <= best_.gamma_low || ProvesRepaired(gamma, at.y);
       if (proven) best_.gamma_low = std::max(best_.gamma_low, gamma);
-      // A little lower after each answer that proved nothing.
+      // The next gamma is a little lower after each one that was not proven infeasible.
       num_unproven_ = proven ? 0 : num_unproven_ + 1;
       const double share = std::min(0.99, 0.8 + 0.05 * num_unproven_);
       return best_.gamma_high * (1.0 - share * options_.relative_gap);
@@ -258,7 +258,7 @@ class PointSearch {
     return std::min(best_.gamma_high, gamma + at.s) * (1.0 - 0.4 * options_.relative_gap);
   }
 
-  // Proves() after as many weighted least-squares steps onto sum y a = 0 as it takes.
+  // Proves() after up to kMaxRepairs weighted least-squares steps towards sum y a = 0.
   bool ProvesRepaired(double gamma, Sixes y) const {
     const PointProgram program(observations_, gamma, {}, false);
     for (Six& of_row : y) of_row[5] = 0.0;

@@ -8,18 +8,18 @@
 
 namespace rotslam {
 
-/// One observation of a single unknown u, a point or a centre: (A u + b) is (x, y, depth) of the
-/// projection less the measurement, x and y still times depth.
+/// One observation of a single unknown u, a point or a centre. (A u + b) is (x, y, depth): the
+/// difference of the projection from the measurement, times depth, and the depth.
 struct PointObservation {
   Eigen::Matrix3d A;
   Eigen::Vector3d b;
 };
 
-/// A point seen from a known centre under a known rotation, u being the point.
+/// Observation of an unknown point u from a known centre and rotation.
 PointObservation SightOfPoint(const Eigen::Matrix3d& R_c_w,
                               const Eigen::Vector3d& center_in_world,
                               const Eigen::Vector2d& xy);
-/// A known point seen under a known rotation, u being the centre.
+/// Observation of a known point from an unknown centre u with known rotation.
 PointObservation SightFromCenter(const Eigen::Matrix3d& R_c_w,
                                  const Eigen::Vector3d& point_in_world,
                                  const Eigen::Vector2d& xy);
@@ -36,24 +36,24 @@ struct MinimaxPointOptions {
   double max_extent = 1e6;
 };
 
-/// The least possible largest residual lies in [gamma_low, gamma_high].
+/// A position and a bracket of the optimum, the smallest largest residual: [gamma_low, gamma_high].
 struct MinimaxPoint {
   Eigen::Vector3d position = Eigen::Vector3d::Zero();  // attains gamma_high
-  double gamma_low = 0.0;         // checked in our own arithmetic, rounding counted
+  double gamma_low = 0.0;                              // proven, with bounds on rounding
   double gamma_high = kInfinity;  // infinite: no position in front of all cameras was found
 };
 
-/// Larger of |x|, |y| over depth, of all observations; infinity where a depth is not positive.
+/// Maximum of |x| / depth and |y| / depth over all observations; infinity where a depth is not
+/// positive.
 double MaxPointResidual(std::span<const PointObservation> observations,
                         const Eigen::Vector3d& position);
 
-/// Position with the least sum of squares of x and y, both still times depth: where a search
-/// starts.
+/// Position with the least sum of squares of x and y times depth: the start of the search.
 Eigen::Vector3d LeastSquaresPoint(std::span<const PointObservation> observations);
 
-/// L-infinity triangulation and resection with known rotation: the position whose largest residual
-/// per image axis is smallest, box norm, with a proven bound.
-/// @param start  tried first, as is the least-squares position.
+/// L-infinity triangulation and resection with known rotation: the position with the smallest
+/// largest residual per image axis (box norm), with a proven lower bound.
+/// @param start  one of two starts; the other is the least-squares position.
 /// Error:   the bracket of relative_gap; [0, gamma_high] where the optimum is zero up to rounding.
 /// Cost:    some 40 interior-point steps on four unknowns; 0.05 ms for six observations.
 /// Source:  Kahl & Hartley, Multiple-View Geometry under the L-infinity Norm, PAMI 2008; ours

@@ -7,16 +7,16 @@
 
 namespace rotslam {
 
-/// How far a step of an interior point method can go without leaving the positive orthant.
+/// Largest step lengths of an interior-point method within the positive orthant.
 struct Reach {
   double primal = 0.0;
   double dual = 0.0;
 };
 
-/// Goes not quite to the boundary.
+/// Share of the distance to the boundary that a step uses.
 inline constexpr double kShareOfReach = 0.99;
 
-/// What moves one row's product of slack and multiplier towards `mu`.
+/// Change that moves one row's product of slack and multiplier into [0.1 mu, 10 mu].
 /// Source: Gondzio, "Multiple centrality corrections in a primal-dual method for linear
 /// programming", Comput. Optim. Appl. 6, 1996.
 inline Five Recentred(const Five& product, double mu) {
@@ -25,18 +25,18 @@ inline Five Recentred(const Five& product, double mu) {
   return (product.max(kLow * mu).min(kHigh * mu) - product).max(-kHigh * mu);
 }
 
-/// Recentres a step while that lengthens it, at most `max_times`; Gondzio 1996.
-/// @param reach_of   Reach of a step.
-/// @param recentred  (step, aim): the step with the products recentred where it ends when made as
-///                   long as `aim`, somewhat further than it can go.
+/// Recentres a step while that increases its length, at most `max_times`; Gondzio 1996.
+/// @param reach_of  computes the Reach of a step.
+/// @param recentred  computes, from a step and an aim, the step with the products recentred at its
+///                   end when it is scaled to `aim`, which is beyond its reach.
 template <typename Step, typename ReachOf, typename RecentredStep>
 std::pair<Step, Reach> Lengthened(Step step,
                                   int max_times,
                                   const ReachOf& reach_of,
                                   const RecentredStep& recentred) {
-  constexpr double kLongEnough = 0.9;
-  constexpr double kFurther = 0.3;
-  constexpr double kWorthwhile = 0.05;
+  constexpr double kLongEnough = 0.9;   // of a full step
+  constexpr double kFurther = 0.3;      // of the aim beyond the reach
+  constexpr double kWorthwhile = 0.05;  // smallest gain in length that pays for a solve
   Reach reach = reach_of(step);
   for (int k = 0; k < max_times && std::min(reach.primal, reach.dual) < kLongEnough; ++k) {
     const Reach aim{std::min(1.0, reach.primal + kFurther), std::min(1.0, reach.dual + kFurther)};

@@ -16,14 +16,14 @@
 namespace rotslam {
 namespace {
 
-// Fewer shared views and points may be wrong together.
+// Smallest number of shared views and points: fewer may be wrong together.
 constexpr int kMinShared = 8;
-// Pairs of shared views and points whose distances are compared.
+// Number of pairs of shared views and points whose distances are compared, which bounds the time.
 constexpr int kNumDistances = 1000;
-// Half of the distances may be so many times longer or shorter (natural logarithm) than the others
-// say; more, and the two blocks do not have the same in view.
+// Largest median deviation of the ratios of distances, natural logarithm. Beyond it the two blocks
+// contradict each other.
 constexpr double kMaxSpread = 0.5;
-// What a block bends by, as a share of its scale and of its size.
+// Assumed deformation of a block relative to its size, as a standard deviation.
 constexpr double kBend = 0.01;
 
 // One view or point, in two blocks.
@@ -65,7 +65,7 @@ void TakeShared(const std::map<Key, Eigen::Vector3d>& a,
   }
 }
 
-// How much larger b is than a (natural logarithm), by distances between what they share.
+// Scale of b relative to a (natural logarithm) from the distances between shared views and points.
 std::optional<Tie> ScaleTie(int a, int b, const std::vector<Shared>& shared) {
   Draw draw(1);
   const int count = static_cast<int>(shared.size());
@@ -77,7 +77,7 @@ std::optional<Tie> ScaleTie(int a, int b, const std::vector<Shared>& shared) {
     const double in_b = (one.in_b - other.in_b).norm();
     if (in_a > 0.0 && in_b > 0.0) lengths.emplace_back(in_a * in_b, std::log(in_b / in_a));
   }
-  // The longer half, which noise changes least.
+  // Only the longer half is used, on which noise has least effect.
   const auto middle = lengths.begin() + static_cast<std::ptrdiff_t>(lengths.size() / 2);
   std::nth_element(lengths.begin(), middle, lengths.end());
   std::vector<double> ratios;
@@ -89,7 +89,7 @@ std::optional<Tie> ScaleTie(int a, int b, const std::vector<Shared>& shared) {
   return Tie{a, b, Eigen::VectorXd::Constant(1, spread.median), std::hypot(sigma, kBend)};
 }
 
-// How far b is off a, both in the world's scale.
+// Shift of b relative to a, both in the world's scale.
 Tie ShiftTie(
     int a, int b, const std::vector<Shared>& shared, double scale_of_a, double scale_of_b) {
   Eigen::Vector3d shift;
@@ -111,7 +111,7 @@ Tie ShiftTie(
   return {a, b, shift, std::max(std::sqrt(variance), std::numeric_limits<double>::min())};
 }
 
-// Values along the surest ties; zero at the root.
+// Values along the spanning tree of the ties with least deviation; zero at the root.
 Eigen::MatrixXd AlongTree(int root, int num_nodes, const std::vector<Tie>& ties) {
   Eigen::MatrixXd values = Eigen::MatrixXd::Zero(num_nodes, ties.front().difference.size());
   std::vector<bool> known(num_nodes, false);
@@ -131,8 +131,8 @@ Eigen::MatrixXd AlongTree(int root, int num_nodes, const std::vector<Tie>& ties)
   }
 }
 
-// The values that the ties between `nodes` contradict least, a row a node; zero at the first of
-// them and outside.
+// Robust least-squares values of `nodes` by the ties between them, one row per node; zero at the
+// first of them and at other nodes.
 Eigen::MatrixXd Reconcile(const std::vector<int>& nodes,
                           int num_nodes,
                           const std::vector<Tie>& ties) {
@@ -168,7 +168,7 @@ Eigen::MatrixXd Reconcile(const std::vector<int>& nodes,
   return values;
 }
 
-// Blocks that ties connect, those with most views together.
+// The connected group of blocks with the most views.
 std::vector<int> LargestGroup(const std::vector<Block>& blocks, const std::vector<Tie>& ties) {
   DisjointSets groups(static_cast<int>(blocks.size()));
   for (const Tie& tie : ties) {

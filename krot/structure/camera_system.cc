@@ -21,7 +21,7 @@ std::vector<std::vector<int>> Neighbours(int num_blocks,
       for (const int b : group) {
         if (a != b) neighbours[a].push_back(b);
       }
-      // Repeats go as soon as they outnumber the rest.
+      // Duplicates are removed as soon as they outnumber the rest.
       if (neighbours[a].size() < 2 * sorted_size[a]) continue;
       tidy(neighbours[a]);
       sorted_size[a] = std::max<std::size_t>(64, neighbours[a].size());
@@ -31,7 +31,7 @@ std::vector<std::vector<int>> Neighbours(int num_blocks,
   return neighbours;
 }
 
-// Breadth-first order of the part that holds `start`, neighbours by degree.
+// Breadth-first order of the connected component of `start`, neighbours by degree.
 std::vector<int> Sweep(const std::vector<std::vector<int>>& neighbours,
                        int start,
                        std::vector<bool> seen) {
@@ -52,7 +52,8 @@ std::vector<int> Sweep(const std::vector<std::vector<int>>& neighbours,
   return order;
 }
 
-// Reverse Cuthill-McKee; each part starts from the far end of a sweep.
+// Reverse Cuthill-McKee order; each connected component starts from the last block of a
+// breadth-first sweep.
 std::vector<int> Positions(const std::vector<std::vector<int>>& neighbours) {
   const int n = static_cast<int>(neighbours.size());
   std::vector<bool> seen(n, false);
@@ -138,7 +139,7 @@ void CameraSystem::Add(int a, int b, const Eigen::Matrix3d& block) {
 }
 
 bool CameraSystem::Factor() {
-  // Rows without entries, the last tile's unused ones among them, decouple.
+  // Rows without entries, such as the unused ones of the last tile, become identities.
   for (int t = 0; t < num_tiles_; ++t) {
     for (int k = 0; k < kTileSize; ++k) {
       if (At(t, t)(k, k) == 0.0) At(t, t)(k, k) = 1.0;

@@ -6,17 +6,17 @@
 
 namespace rotslam {
 
-/// Symmetric positive definite system of 3 x 3 blocks, factored as L L^T in square tiles. The
-/// blocks are ordered by reverse Cuthill-McKee, so that a drive gives a band of tiles and an orbit
-/// all of them; arithmetic is dense within a tile.
+/// Symmetric positive definite system of 3 x 3 blocks, factored as L L^T in square tiles. Blocks
+/// are ordered by reverse Cuthill-McKee, so that the tiles of a drive form a band; those of an
+/// orbit are all non-zero. Arithmetic is dense within a tile.
 class CameraSystem {
  public:
-  /// @param groups  blocks that may be non-zero are those of two members of one group, members in
-  ///                [0, num_blocks).
+  /// @param groups  block (a, b) may be non-zero where a and b are members of one group; members
+  ///                are in [0, num_blocks).
   CameraSystem(int num_blocks, const std::vector<std::vector<int>>& groups);
 
   void SetZero();
-  /// Adds to block (a, b), and to (b, a) its transpose; a diagonal block is added once.
+  /// Adds `block` to block (a, b) and its transpose to (b, a); a diagonal block is added once.
   void Add(int a, int b, const Eigen::Matrix3d& block);
   /// False when the matrix is not positive definite. Blocks without entries count as identities.
   bool Factor();

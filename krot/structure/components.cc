@@ -24,8 +24,8 @@ struct Sight {
 
 using SightsOfView = std::map<FrameId, std::vector<Sight>>;
 
-// The pair of free views that shares the most tracks with parallax between the two; the earliest
-// of equals.
+// The pair of remaining views with the most common tracks with parallax between the two; the
+// earliest of equal ones.
 std::optional<std::pair<FrameId, FrameId>> BestPair(const std::vector<Track>& tracks,
                                                     const RotationMap& cam_from_world,
                                                     const std::set<FrameId>& free_views,
@@ -36,7 +36,7 @@ std::optional<std::pair<FrameId, FrameId>> BestPair(const std::vector<Track>& tr
       const Observation& first = track.observations[a];
       if (!free_views.contains(first.frame)) continue;
       const Eigen::Vector3d ray = cam_from_world.at(first.frame).Inverse() * first.bearing;
-      // Long tracks make many pairs; the next dozen views serve as seeds well enough.
+      // A long track has many pairs of views; those within the next dozen suffice as seeds.
       const std::size_t end = std::min(track.observations.size(), a + 13);
       for (std::size_t b = a + 1; b < end; ++b) {
         const Observation& second = track.observations[b];
@@ -115,7 +115,7 @@ class Grower {
     Eigen::Vector3d ray_in_world;
   };
 
-  // How much of a known point two sights make, 0 to 1.
+  // Weight of a point seen by two views, 0 (unknown depth) to 1 (known).
   double Knowledge(const FirstSight& first, FrameId view, const Eigen::Vector3d& ray) const {
     const double parallax = Angle(first.ray_in_world, ray);
     if (parallax >= options_.min_parallax_rad) return 1.0;
@@ -136,8 +136,8 @@ class Grower {
   const std::set<FrameId>& free_views_;
   const ComponentOptions& options_;
   std::vector<std::optional<FirstSight>> first_sight_;
-  std::vector<double> known_;            // how much of a known point each track is
-  std::map<FrameId, double> num_known_;  // known points seen by each view not yet placed
+  std::vector<double> known_;            // weight of each track as a known point
+  std::map<FrameId, double> num_known_;  // known points seen by each remaining view
   std::set<FrameId> placed_;
   ViewComponent component_;
 };

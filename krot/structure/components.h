@@ -24,21 +24,21 @@ struct ComponentOptions {
   double min_noise_ratio = 4.0;
 };
 
-/// Views whose positions hang together rigidly: one scale, one translation.
+/// Views whose relative positions are determined up to one common scale and translation.
 struct ViewComponent {
-  std::vector<FrameId> views;  // in an order in which each can be placed from the ones before
+  std::vector<FrameId> views;  // each can be registered from the ones before it
 };
 
-/// Grows rigid components: a pair of views, then every view that sees enough points already known,
-/// nearest in time first. A sufficient condition: what is joined is rigid, though more may be.
-/// Views left over stand in no component.
-/// @param tracks  frames all in `cam_from_world`, bearings finite.
+/// Finds rigid components: starting from a pair of views, adds every view that sees enough known
+/// points, the nearest in time first. The condition is sufficient, not necessary: components are
+/// rigid, though larger ones may exist. Remaining views are in no component.
+/// @param tracks  with frames in `cam_from_world` and finite bearings.
 std::vector<ViewComponent> FindComponents(const RotationMap& cam_from_world,
                                           const std::vector<Track>& tracks,
                                           const ComponentOptions& options);
 
-/// Largest angle between a track's first world-frame ray and any later one, rad: parallax with the
-/// rotation taken out, noise and rotation error left in.
+/// Largest angle between a track's first ray and any later one in world axes, rad. It contains
+/// parallax, noise and rotation errors, but not the rotation itself.
 double TrackParallax(const RotationMap& cam_from_world, const Track& track);
 
 }  // namespace rotslam

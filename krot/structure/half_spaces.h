@@ -9,12 +9,12 @@
 
 namespace rotslam {
 
-/// Five numbers of an observation, one per half-space: right, left, below, above, depth.
+/// Five values per observation, one for each half-space: right, left, below, above, depth.
 using Five = Eigen::Array<double, 5, 1>;
 using Fives = std::vector<Five>;
 
 /// The rows a_k . (X - c) of the linear programs (see minimax_lp.h) at one image bound, for methods
-/// that never write the matrix down. Unknowns lie as StructureLayout says.
+/// that do not form the matrix. StructureLayout defines the order of the unknowns.
 class HalfSpaces {
  public:
   /// Keeps a reference to `problem`.
@@ -78,7 +78,7 @@ class HalfSpaces {
 /// Largest step in [0, 1] along `step` that keeps all entries of `value` positive.
 double StepToBoundary(const Fives& value, const Fives& step);
 
-/// Unknowns of a structure in the gauge of view 0, and back.
+/// Converts a structure to the vector of unknowns in the gauge of view 0, and back.
 Eigen::VectorXd Packed(const StructureLayout& layout, const MinimaxStructure& structure);
 MinimaxStructure Unpacked(const StructureLayout& layout, const Eigen::VectorXd& x);
 

@@ -11,9 +11,9 @@
 namespace rotslam {
 namespace {
 
-// The feasibility program counts its slack in units of gamma, and a unit of it costs this much. One
-// and the other lift the optimum well above the engine's tolerance (1e-7): with plain units and
-// price 1 a third of the programs near the optimum came back undecided, with these one in fifty.
+// Weight of the slack in the feasibility program, whose unit is gamma. Weight and unit keep the
+// optimum well above the engine's tolerance of 1e-7; with weight 1 and plain units a third of the
+// programs near the optimum are undecided.
 constexpr double kSlackPrice = 100.0;
 double SlackUnit(double gamma) { return std::max(gamma, 1e-6); }
 
@@ -51,8 +51,8 @@ void AddMultipliers(const MinimaxProblem& problem,
   }
 }
 
-// Centres and points are the prices of the dual's rows. With min -sum w, Lagrangian stationarity
-// gives row prices equal to minus the unknowns.
+// Centres and points are the multipliers of the dual's rows. With min -sum w, stationarity of the
+// Lagrangian gives multipliers equal to minus the unknowns.
 MinimaxLpResult FromDual(const LpResult& lp, const StructureLayout& rows) {
   MinimaxLpResult result;
   result.call = lp.call;
@@ -77,8 +77,8 @@ MinimaxLpResult FromDual(const LpResult& lp, const StructureLayout& rows) {
 
 using NormalTable = std::vector<std::array<Eigen::Vector3d, 5>>;
 
-// Sums whose rounding is summed as well (Neumaier): they err by a few units in the last place of
-// the largest term, however many terms there are.
+// Compensated sums (Neumaier): their error is a few units in the last place of the largest term for
+// any number of terms.
 class CompensatedSums {
  public:
   explicit CompensatedSums(int size)
@@ -100,14 +100,14 @@ class CompensatedSums {
   Eigen::VectorXd lost_;
 };
 
-// Residual sums e = sum_k y_k a_k of every centre and point, with what bounds their rounding.
+// Residual sums e = sum_k y_k a_k of every centre and point, with a bound of their rounding.
 struct Imbalance {
   Eigen::VectorXd sum;
   double absolute_sum = 0.0;  // of the absolute values of all terms
   double num_terms = 0.0;
 
-  // Largest 1-norm the exact sums can have. Every term carries up to eight roundings of its own
-  // from the normal and the product; the compensated sums of n terms add two and n^2 epsilon.
+  // Upper bound of the 1-norm of the exact sums. Every term has up to eight roundings from the
+  // normal and the product; the compensated sum of n terms adds two and n^2 epsilon.
   double Bound() const {
     constexpr double kEpsilon = 2.3e-16;
     const double of_sums = 4.0 + kEpsilon * num_terms * num_terms;
@@ -136,9 +136,9 @@ Imbalance ComputeImbalance(const MinimaxProblem& problem,
   return imbalance;
 }
 
-// One step y += -D E^T (E D E^T)^-1 e with D = diag(y): every multiplier moves by a share of itself
-// and stays positive. (D = diag(y^2) spans twice the digits and left imbalances of 1e-8 where this
-// reaches 1e-14.)
+// One step y += -D E^T (E D E^T)^-1 e with D = diag(y): every multiplier changes in proportion to
+// its size and stays positive. (D = diag(y^2) has twice the range of magnitudes and ends at 1e-8
+// instead of 1e-14.)
 bool RepairStep(const MinimaxProblem& problem,
                 const NormalTable& normals,
                 const StructureLayout& rows,

@@ -19,8 +19,9 @@ namespace rotslam {
 //   below, above  +-(r2 - v r3) - gamma r3,  b = 0
 //   depth         -r3,                       b = -1    (fixes the scale: smallest depth one)
 
-/// Throws std::invalid_argument where there is no such program: a problem that CheckProblem refuses
-/// or without two views, a point and an observation, a gamma that is negative or not finite.
+/// Throws std::invalid_argument where the program is not defined: for a problem that CheckProblem
+/// rejects or that lacks two views, a point and an observation, and for a gamma that is negative or
+/// not finite.
 void RequireProgram(const MinimaxProblem& problem, double gamma);
 
 /// Normals a_0 .. a_4 of one observation, in world axes.
@@ -28,38 +29,39 @@ std::array<Eigen::Vector3d, 5> HalfSpaceNormals(const Eigen::Matrix3d& R_c_w,
                                                 const Eigen::Vector2d& xy,
                                                 double gamma);
 
-/// What one program gave.
+/// The result of a linear program.
 struct MinimaxLpResult {
   LpCallStatus call = LpCallStatus::kNotRun;
   LpModelStatus model = LpModelStatus::kUnknown;
   MinimaxStructure structure;       // empty when the call failed
-  std::vector<double> multipliers;  // 5 per observation, >= 0: the half-spaces' prices
+  std::vector<double> multipliers;  // 5 per observation, >= 0: of the half-spaces
   double objective = 0.0;
   int iterations = 0;
   double seconds = 0.0;
 };
 
-/// min s  s.t.  a_k . (X - c) <= b_k + s gamma (k < 4),  <= b_k + s (depth),  s >= 0: is there a
-/// structure with all residuals at most `gamma`? Zero objective says yes (recompute MaxBoxResidual
-/// of the structure), a positive one no (check the multipliers with CertifiesInfeasible).
+/// Feasibility program: min s  s.t.  a_k . (X - c) <= b_k + s gamma (k < 4),  <= b_k + s (depth),
+/// s >= 0. An objective of zero means that a structure with all residuals at most `gamma` exists
+/// (verify with MaxBoxResidual), a positive one that there is none (verify the multipliers with
+/// CertifiesInfeasible).
 MinimaxLpResult SolveFeasibility(const MinimaxProblem& problem,
                                  double gamma,
                                  const LpOptions& options = {});
 
-/// min sum of the slacks by which half-spaces are missed, a slack of the depth bound counted
-/// `depth_price` times: the robust start. Outliers buy their slack, inliers pay none.
-/// @param weights  price of each observation's slack, positive; empty: all one.
+/// L1 program for the robust start: the minimum of the sum of slacks of the half-spaces, with
+/// slacks of the depth bound weighted by `depth_price`. Only outliers have slack.
+/// @param weights  weight of each observation's slack, positive; empty: all one.
 MinimaxLpResult SolveL1Slack(const MinimaxProblem& problem,
                              double gamma,
                              double depth_price,
                              const std::vector<double>& weights = {},
                              const LpOptions& options = {});
 
-/// True when `multipliers` prove, in plain double arithmetic with its rounding counted, that no
-/// structure has all residuals at most `gamma` and all depths positive. Independent of the LP
-/// engine: the multipliers are first repaired by weighted least squares onto
-/// sum_k y_k a_k = 0 for every point and every centre but the first, then
-/// sum of depth multipliers > max_extent * (what is left of those sums) must hold.
+/// True when `multipliers` prove, in double arithmetic with bounds on its rounding, that no
+/// structure has all residuals at most `gamma` and all depths positive. The proof does not depend
+/// on the LP engine: the multipliers are first corrected by weighted least squares so that sum_k
+/// y_k a_k = 0 for every point and every centre but the first. Then sum of depth multipliers >
+/// max_extent * (remainder of those sums) must hold.
 /// @param max_extent  structures larger than this many smallest depths are not excluded.
 bool CertifiesInfeasible(const MinimaxProblem& problem,
                          double gamma,

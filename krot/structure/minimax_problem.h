@@ -14,12 +14,12 @@ struct ImageObservation {
 };
 
 /// The known-rotation problem with dense indices: find centres and points from rotations and image
-/// coordinates. View 0 holds the gauge (its centre is the origin).
+/// coordinates. The centre of view 0 is the origin.
 struct MinimaxProblem {
   std::vector<Eigen::Matrix3d> R_c_w;
   int num_points = 0;
   std::vector<ImageObservation> observations;
-  // Views and points that stay where a start has them; empty: none. View 0 stays in any case.
+  // Views and points fixed at their start values; empty: none. View 0 is always fixed.
   std::vector<bool> view_fixed;
   std::vector<bool> point_fixed;
 
@@ -28,24 +28,24 @@ struct MinimaxProblem {
   int num_views() const { return static_cast<int>(R_c_w.size()); }
 };
 
-/// An answer to a MinimaxProblem.
+/// A solution of a MinimaxProblem.
 struct MinimaxStructure {
   std::vector<Eigen::Vector3d> center_in_world;
   std::vector<Eigen::Vector3d> point_in_world;
 };
 
-/// Larger of |dx|, |dy| between an observation and the projection of its point; infinity when the
-/// point is not in front of the camera.
+/// The larger of |dx| and |dy| between an observation and the projection of its point, in
+/// normalised image units; infinity when the point is not in front of the camera.
 double BoxResidual(const MinimaxProblem& problem,
                    const MinimaxStructure& structure,
                    const ImageObservation& observation);
 
-/// Largest BoxResidual of all observations: the quantity the solver minimises. An upper bound of
-/// the optimum, whatever the structure. Zero for no observations.
+/// Largest BoxResidual of all observations, which the solver minimises. For any structure it is an
+/// upper bound of the optimum. Zero without observations.
 double MaxBoxResidual(const MinimaxProblem& problem, const MinimaxStructure& structure);
 
-/// Throws std::invalid_argument when an index is out of range, a number is not finite or the flags
-/// of what is fixed are not as many as views or points.
+/// Throws std::invalid_argument when an index is out of range, a number is not finite or the number
+/// of flags differs from that of views or points.
 void CheckProblem(const MinimaxProblem& problem);
 
 }  // namespace rotslam

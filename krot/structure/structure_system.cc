@@ -10,13 +10,12 @@
 namespace rotslam {
 namespace {
 
-// Damping in units of the diagonal before elimination: what double arithmetic cannot tell from
-// zero.
+// Damping relative to the diagonal before elimination: the level of rounding in double arithmetic.
 constexpr double kDamping = 1e-15;
-// Rounding can leave the centres' system indefinite by more than that.
+// Largest damping; rounding may make the centres' system indefinite by more than kDamping.
 constexpr double kMaxDamping = 1e-8;
 
-// Lower factor of a symmetric 3 x 3 matrix; pivots at most `floor` count as that.
+// Lower Cholesky factor of a symmetric 3 x 3 matrix; pivots are at least `floor`.
 Eigen::Matrix3d Cholesky3(const Eigen::Matrix3d& V, double floor) {
   Eigen::Matrix3d L = Eigen::Matrix3d::Zero();
   L(0, 0) = std::sqrt(std::max(V(0, 0), floor));

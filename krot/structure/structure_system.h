@@ -28,10 +28,10 @@ struct PointGroups {
 
 class CameraSystem;
 
-/// Linear systems with the structure of bundle adjustment; what the problem holds fixed has its
-/// place in the vectors, and zero in the solutions. H is the sum over the observations of (X - c)
-/// -> S (X - c) with 3 x 3 positive semidefinite S. Points are eliminated one by one; the system of
-/// the centres is factored by tiles, of which only those that fill in exist.
+/// Linear systems with the structure of bundle adjustment. Fixed views and points have entries in
+/// the vectors, and zeros in the solutions. H is the sum over the observations of (X - c) -> S (X -
+/// c) with 3 x 3 positive semidefinite S. Points are eliminated one by one; the system of the
+/// centres is factored in tiles, of which only the non-zero ones are stored.
 /// Cost:    sum of squared track lengths to assemble; the centres' factor is linear in the views
 ///          for a drive, cubic where every two views share points.
 class StructureSystem {
@@ -41,12 +41,12 @@ class StructureSystem {
   StructureSystem(const StructureSystem&) = delete;
   StructureSystem& operator=(const StructureSystem&) = delete;
 
-  /// Assembles and factors H plus a damping at the level of round-off, or as much more as makes it
-  /// positive definite in double arithmetic. False when that is too much.
+  /// Assembles and factors H plus a damping at the level of rounding, increased until H is positive
+  /// definite in double arithmetic. False when the damping would become too large.
   /// @param S  one per observation, in the problem's order.
   bool Factor(const std::vector<Eigen::Matrix3d>& S);
 
-  /// H^-1 b, laid out as StructureLayout says. After Factor() with the same `S`.
+  /// H^-1 b in the order of StructureLayout. Call after Factor() with the same `S`.
   Eigen::VectorXd Solve(const std::vector<Eigen::Matrix3d>& S, const Eigen::VectorXd& b) const;
 
  private:

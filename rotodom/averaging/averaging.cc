@@ -20,7 +20,7 @@ constexpr std::array<NamedMode, 3> kModes = {{{"off", AveragingMode::kOff},
                                               {"window", AveragingMode::kWindow},
                                               {"global", AveragingMode::kGlobal}}};
 
-// The L1 stage is a start: it need not be finished.
+// The L1 stage stops at steps below this, rad: it only computes a start.
 constexpr double kL1Step = 1e-3;
 
 // Position in an ascending list, -1 when it is not there.
@@ -34,7 +34,7 @@ Eigen::Matrix3d WithFloor(const Eigen::Matrix3d& covariance, const AveragingOpti
   return covariance + floor_rad * floor_rad * Eigen::Matrix3d::Identity();
 }
 
-// Edges with a free end, each once: of an edge with two free ends the later end brings it.
+// Edges with a free view, each once: those between two free views are listed at the later one.
 std::vector<const RelativeRotation*> EdgesAt(const ViewGraph& graph,
                                              const std::vector<FrameId>& free) {
   std::vector<const RelativeRotation*> edges;
@@ -48,37 +48,37 @@ std::vector<const RelativeRotation*> EdgesAt(const ViewGraph& graph,
   return edges;
 }
 
-// The ends of `edges` that are not free, less those without an orientation.
-std::vector<FrameId> HeldAt(const std::vector<const RelativeRotation*>& edges,
-                            const std::vector<FrameId>& free,
-                            const RotationMap& cam_from_world) {
-  std::vector<FrameId> held;
+// Views of `edges` that are not free and have an orientation.
+std::vector<FrameId> FixedViewsOf(const std::vector<const RelativeRotation*>& edges,
+                                  const std::vector<FrameId>& free,
+                                  const RotationMap& cam_from_world) {
+  std::vector<FrameId> fixed;
   for (const RelativeRotation* edge : edges) {
-    if (PositionIn(free, edge->i) < 0) held.push_back(edge->i);
-    if (PositionIn(free, edge->j) < 0) held.push_back(edge->j);
+    if (PositionIn(free, edge->i) < 0) fixed.push_back(edge->i);
+    if (PositionIn(free, edge->j) < 0) fixed.push_back(edge->j);
   }
-  std::sort(held.begin(), held.end());
-  held.erase(std::unique(held.begin(), held.end()), held.end());
-  std::erase_if(held, [&](FrameId view) { return !cam_from_world.contains(view); });
-  return held;
+  std::sort(fixed.begin(), fixed.end());
+  fixed.erase(std::unique(fixed.begin(), fixed.end()), fixed.end());
+  std::erase_if(fixed, [&](FrameId view) { return !cam_from_world.contains(view); });
+  return fixed;
 }
 
 // The robust least-squares problem; the free views come first in its list.
 EdgeSystem MakeSystem(const std::vector<const RelativeRotation*>& edges,
                       const std::vector<FrameId>& free,
-                      const std::vector<FrameId>& held,
+                      const std::vector<FrameId>& fixed,
                       const RotationMap& cam_from_world,
                       const AveragingOptions& options) {
   std::vector<Eigen::Quaterniond> orientations;
-  orientations.reserve(free.size() + held.size());
+  orientations.reserve(free.size() + fixed.size());
   for (const FrameId view : free) orientations.push_back(cam_from_world.at(view).Quaternion());
-  for (const FrameId view : held) orientations.push_back(cam_from_world.at(view).Quaternion());
+  for (const FrameId view : fixed) orientations.push_back(cam_from_world.at(view).Quaternion());
   const int num_free = static_cast<int>(free.size());
   EdgeSystem system(std::move(orientations), num_free, options.loss_sigmas);
   const auto position = [&](FrameId view) {
     if (const int among_free = PositionIn(free, view); among_free >= 0) return among_free;
-    const int among_held = PositionIn(held, view);
-    return among_held < 0 ? -1 : num_free + among_held;
+    const int among_fixed = PositionIn(fixed, view);
+    return among_fixed < 0 ? -1 : num_free + among_fixed;
   };
   system.Reserve(edges.size());
   for (const RelativeRotation* edge : edges) {
@@ -153,15 +153,15 @@ RotationMap AverageRotations(const ViewGraph& graph,
   }
   std::vector<FrameId> free(free_views.begin(), free_views.end());
   const std::vector<const RelativeRotation*> edges = EdgesAt(graph, free);
-  std::vector<FrameId> held = HeldAt(edges, free, cam_from_world);
-  if (held.empty() && !free.empty()) {
-    held.push_back(free.front());
+  std::vector<FrameId> fixed = FixedViewsOf(edges, free, cam_from_world);
+  if (fixed.empty() && !free.empty()) {
+    fixed.push_back(free.front());
     free.erase(free.begin());
   }
-  EdgeSystem system = MakeSystem(edges, free, held, cam_from_world, options);
+  EdgeSystem system = MakeSystem(edges, free, fixed, cam_from_world, options);
   if (system.terms().empty()) return averaged;
   system.Linearize();
-  if (system.CountDoubtfulViews() > 0) {
+  if (system.CountInconsistentViews() > 0) {
     for (int iteration = 0; iteration < options.l1_iterations; ++iteration) {
       if (system.Step(EdgeLoss::kL1) < kL1Step) break;
     }

@@ -10,11 +10,11 @@
 
 namespace rotslam {
 
-/// What happens to the orientations when a frame has come.
+/// Which orientations are averaged after a new frame.
 enum class AveragingMode {
-  kOff,     // nothing: every orientation stays chained to its best edge
-  kWindow,  // the newest `window` are averaged, the older ones held: constant time
-  kGlobal,  // all are averaged: time grows with the sequence
+  kOff,     // none: every orientation is chained to its best edge
+  kWindow,  // the newest `window`, older ones are fixed: constant time
+  kGlobal,  // all: time grows with the sequence
 };
 /// "off", "window" or "global"; nullopt for another word.
 std::optional<AveragingMode> AveragingModeNamed(const std::string& name);
@@ -82,19 +82,18 @@ struct AveragingOptions {
   }
 };
 
-/// The views that `options.mode` wants free once the newest one has its start; never the first one,
-/// which defines the world. Throws std::invalid_argument when an option is out of range.
+/// The views that `options.mode` leaves free once the newest one has its start; never the first
+/// one, which defines the world. Throws std::invalid_argument when an option is out of range.
 std::set<FrameId> ViewsToAverage(const RotationMap& cam_from_world,
                                  const AveragingOptions& options);
 
-/// Turns the orientations in `free_views` so that the edges' relative rotations agree best, all
-/// other orientations held: iteratively re-weighted least squares in the tangent space, edges
-/// weighted by their covariances.
-/// @param cam_from_world  start, and the anchors: every view that is not free. Edges to views that
-///                        it does not name are ignored.
-/// @param free_views      views to move. When no edge ties them to an anchor, the oldest one is
-///                        held.
-/// @return  the new orientations of `free_views`, and nothing else: the caller's map may be long.
+/// Averages the orientations in `free_views` so that they agree best with the edges, all others
+/// being fixed: iteratively re-weighted least squares in the tangent space, edges weighted by their
+/// covariances.
+/// @param cam_from_world  start values, and the anchors: every view that is not free. Edges to
+///                        views without an orientation are ignored.
+/// @param free_views  views to average. Without an edge to an anchor, the oldest one is fixed.
+/// @return  the new orientations of `free_views` only.
 /// Error:   the cost's minimum nearest to the start, to min_step_deg.
 /// Cost:    one solution for 3 |free_views| unknowns per iteration (EdgeSystem); 10 free views with
 ///          50 edges take about 0.02 ms in all (tests/bench/averaging_bench.cc).
@@ -106,9 +105,9 @@ RotationMap AverageRotations(const ViewGraph& graph,
                              const std::set<FrameId>& free_views,
                              const AveragingOptions& options);
 
-/// How many edges of every view agree with the orientations: those within options.loss_sigmas
-/// standard deviations, floor included. Views without an agreeing edge have 0; edges to views that
-/// `cam_from_world` does not name are ignored.
+/// Number of edges of every view that agree with the orientations: those within options.loss_sigmas
+/// standard deviations, edge_floor_deg included. Views without an agreeing edge have 0; edges to
+/// views without an orientation are ignored.
 std::map<FrameId, int> CountInlierEdges(const ViewGraph& graph,
                                         const RotationMap& cam_from_world,
                                         const AveragingOptions& options);

@@ -14,7 +14,8 @@ namespace {
 constexpr int kMaxNewtonSteps = 100;
 constexpr double kSmallestTurn_rad = 1e-12;
 constexpr double kLeastDamping = 1e-12;
-// Relative to the largest diagonal: what rounding hides, and where the search for epsilon ends.
+// Bounds of the search for epsilon, relative to the largest diagonal entry: the level of rounding,
+// and a value at which every S is positive definite.
 constexpr double kFirstShift = 1e-12;
 constexpr double kLastShift = 10.0;
 
@@ -83,7 +84,7 @@ double Cost(const Chords& chords) {
   return cost;
 }
 
-// The cost's downhill direction by turns in the world's frame, times a quarter.
+// A quarter of the negative gradient by rotations in the world's frame.
 Eigen::VectorXd Descent(const Chords& chords) {
   Eigen::VectorXd descent = Eigen::VectorXd::Zero(3 * chords.num_views());
   for (const Chord& edge : chords.edges) {
@@ -104,8 +105,8 @@ void Turn(Chords& chords, const Eigen::VectorXd& turns) {
   }
 }
 
-// Steps with the graph's Laplacian for the Hessian, which it is for small residuals; backwards
-// halves of a step where the cost would grow.
+// Newton steps with the graph's Laplacian as Hessian, which is accurate for small residuals. Steps
+// that would increase the cost are halved.
 void Refine(Chords& chords) {
   std::vector<LaplacianEdge> laplacian;
   laplacian.reserve(chords.edges.size());
@@ -117,7 +118,7 @@ void Refine(Chords& chords) {
   for (int step = 0; step < kMaxNewtonSteps; ++step) {
     Eigen::VectorXd turns = Descent(chords);
     if (!solver.Solve(laplacian, kLeastDamping, turns)) return;
-    // A common turn of all views changes nothing.
+    // A common rotation of all views is the gauge, so one view is fixed.
     const std::vector<Eigen::Matrix3d> before = chords.R_c_w;
     bool goes_down = false;
     for (double length = 1.0; length > 1e-3 && !goes_down; length *= 0.5) {

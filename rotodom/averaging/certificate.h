@@ -8,23 +8,23 @@
 
 namespace rotslam {
 
-/// What is certified: the chordal least-squares cost, the sum over the edges of
-/// weight |R_j - R_j_i R_i|^2 (Frobenius), weights fixed and isotropic. It is not the robust cost
-/// that AverageGlobally minimises; on its inliers the two have their minima close together.
+/// Bound on the chordal least-squares cost, the sum over the edges of weight |R_j - R_j_i R_i|^2
+/// (Frobenius) with fixed isotropic weights. It differs from the robust cost that AverageGlobally
+/// minimises; on the inliers the minima of both are close.
 struct AveragingCertificate {
   RotationMap cam_from_world;  // refined to a stationary point of this cost
   double cost = 0.0;
-  // No orientations have a lower cost than `cost_bound`.
+  // Lower bound of the cost of any orientations.
   double cost_bound = 0.0;
-  // The smallest eigenvalue of the dual matrix is at least this; zero or little below it where the
-  // orientations are optimal.
+  // Lower bound of the smallest eigenvalue of the dual matrix; zero, or slightly negative, where
+  // the orientations are optimal.
   double smallest_eigenvalue = 0.0;
   double gradient = 0.0;  // of the cost, largest of a view, relative to the view's weights
   double RelativeGap() const { return cost > 0.0 ? (cost - cost_bound) / cost : 0.0; }
 };
 
-/// Refines orientations to a minimum of the chordal cost and bounds how far from the global minimum
-/// it can be.
+/// Refines orientations to a minimum of the chordal cost and bounds its distance from the global
+/// minimum.
 ///
 /// At a stationary point the Lagrange multipliers of R^T R = I follow in closed form; with the
 /// multipliers' blocks Lambda and the connection Laplacian L of the graph, every choice of n

@@ -12,13 +12,14 @@ namespace rotslam {
 namespace {
 
 constexpr int kEdgesPerChunk = 8192;
-// Cycles enough to decide, and the neighbours of a view that are tried for cycles of four.
+// Number of consistent cycles at which an edge is decided, and of neighbours tried for cycles of
+// four, which bounds the time.
 constexpr int kEnoughCycles = 3;
 constexpr int kMaxNeighbours = 32;
-// Right edges close at least this share of their cycles while most edges are right.
+// A right edge closes at least one in this many of its cycles while most edges are right.
 constexpr int kCyclesPerConsistent = 6;
 
-EdgeVerdict JudgeByTriangles(const ConsensusGraph& graph, int edge) {
+EdgeVerdict ClassifyByTriangles(const ConsensusGraph& graph, int edge) {
   const ConsensusEdge& e = graph.edge(edge);
   const std::span<const ConsensusGraph::Neighbour> at_i = graph.NeighboursOf(e.i);
   const std::span<const ConsensusGraph::Neighbour> at_j = graph.NeighboursOf(e.j);
@@ -45,7 +46,7 @@ EdgeVerdict JudgeByTriangles(const ConsensusGraph& graph, int edge) {
 }
 
 // @param mark  -1 for every view.
-EdgeVerdict JudgeBySquares(const ConsensusGraph& graph, int edge, std::vector<int>& mark) {
+EdgeVerdict ClassifyBySquares(const ConsensusGraph& graph, int edge, std::vector<int>& mark) {
   const ConsensusEdge& e = graph.edge(edge);
   const std::span<const ConsensusGraph::Neighbour> at_i = graph.NeighboursOf(e.i);
   const std::span<const ConsensusGraph::Neighbour> at_j = graph.NeighboursOf(e.j);
@@ -114,16 +115,16 @@ std::vector<int> ConsensusGraph::Components() const {
   return component;
 }
 
-std::vector<EdgeVerdict> JudgeByShortCycles(const ConsensusGraph& graph, int num_threads) {
+std::vector<EdgeVerdict> ClassifyByShortCycles(const ConsensusGraph& graph, int num_threads) {
   std::vector<EdgeVerdict> verdicts(static_cast<std::size_t>(graph.num_edges()));
   const int num_chunks = (graph.num_edges() + kEdgesPerChunk - 1) / kEdgesPerChunk;
   ParallelFor(num_chunks, num_threads, [&](int chunk) {
     std::vector<int> mark(static_cast<std::size_t>(graph.num_views()), -1);
     const int end = std::min(graph.num_edges(), (chunk + 1) * kEdgesPerChunk);
     for (int edge = chunk * kEdgesPerChunk; edge < end; ++edge) {
-      verdicts[edge] = JudgeByTriangles(graph, edge);
+      verdicts[edge] = ClassifyByTriangles(graph, edge);
       if (verdicts[edge] == EdgeVerdict::kConfirmed) continue;
-      const EdgeVerdict by_squares = JudgeBySquares(graph, edge, mark);
+      const EdgeVerdict by_squares = ClassifyBySquares(graph, edge, mark);
       if (by_squares != EdgeVerdict::kUnknown) verdicts[edge] = by_squares;
     }
   });

@@ -12,16 +12,17 @@ namespace rotslam {
 /// Square of twice the sine of half the angle: the angle's square while it is small.
 inline double SquaredAngle(const Eigen::Quaterniond& q) { return 4.0 * q.vec().squaredNorm(); }
 
-/// Beyond this tolerance agreement is no evidence: one rotation at random in a thousand agrees.
+/// Largest tolerance at which agreement is evidence: one random rotation in a thousand agrees by
+/// chance.
 constexpr double kLargestEvidence_rad = 0.25;
 inline bool IsEvidence(double squared_tolerance) {
   return squared_tolerance < kLargestEvidence_rad * kLargestEvidence_rad;
 }
 
-/// What cycles say of an edge.
+/// Classification of an edge by cycles.
 enum class EdgeVerdict : char { kUnknown, kContradicted, kConfirmed };
 
-/// The edges of a ConsensusProblem, which must outlive it, by view.
+/// The edges of a ConsensusProblem by view. The problem must outlive it.
 class ConsensusGraph {
  public:
   struct Neighbour {
@@ -40,16 +41,16 @@ class ConsensusGraph {
     return {neighbours_.data() + first_[view],
             static_cast<std::size_t>(first_[view + 1] - first_[view])};
   }
-  /// The edge's rotation, read from view `from`.
+  /// The edge's rotation in the direction that starts at view `from`.
   Eigen::Quaterniond Along(int edge, int from) const {
     const ConsensusEdge& e = problem_.edges[edge];
     return e.i == from ? e.j_from_i : e.j_from_i.conjugate();
   }
-  /// Square of the angle within which rotations agree whose difference has this variance per axis.
+  /// Squared angle within which two rotations agree whose difference has this variance per axis.
   double Tolerance(double variance) const {
     return problem_.trust_sigmas * problem_.trust_sigmas * variance;
   }
-  /// Connected pieces of the graph, by view, numbered by their first views.
+  /// Connected components of the graph, by view, numbered by their first views.
   std::vector<int> Components() const;
 
  private:
@@ -58,8 +59,9 @@ class ConsensusGraph {
   std::vector<Neighbour> neighbours_;  // by view, then by neighbour
 };
 
-/// Edges that close triangles or cycles of four with the identity, and edges that do not.
+/// Classifies edges by triangles and cycles of four: whether the rotations around them compose to
+/// the identity.
 /// Cost:    O(E degree^2) at most for E edges.
-std::vector<EdgeVerdict> JudgeByShortCycles(const ConsensusGraph& graph, int num_threads);
+std::vector<EdgeVerdict> ClassifyByShortCycles(const ConsensusGraph& graph, int num_threads);
 
 }  // namespace rotslam

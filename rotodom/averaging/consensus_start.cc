@@ -15,18 +15,20 @@
 namespace rotslam {
 namespace {
 
-// Trees at random that are tried in a row without confirming anything, by size of the graph.
+// Number of successive random trees without a new confirmation at which the search ends, by number
+// of edges.
 constexpr int kMaxVainTrees = 60;
 constexpr int kMinVainTrees = 2;
 constexpr double kVainTreeEdges = 2.5e5;
-// Edges between two pieces: compared in pairs up to this number; the share that must agree.
+// Edges between two groups of confirmed views: largest number compared in pairs, and the inverse of
+// the share that must agree.
 constexpr int kMaxVotes = 64;
 constexpr int kVotesPerAgreement = 4;
-// Times that trees are begun, by size of the graph, while the best ones contradict more than this
-// share of the edges; and the trials between two beginnings.
+// Number of restarts, by number of edges, while the best tree contradicts more than this share of
+// the edges; and the numbering offset of trials between restarts.
 constexpr int kMaxBeginnings = 5;
 constexpr double kBeginningEdges = 2e4;
-constexpr double kLittleDoubt = 0.15;
+constexpr double kLittleContradiction = 0.15;
 constexpr int kTrialsPerBeginning = 1000;
 
 class Consensus {
@@ -42,12 +44,12 @@ class Consensus {
  private:
   bool IsConfirmed(int edge) const { return knowledge_.IsConfirmed(edge); }
   void Confirm(int edge) { knowledge_.verdict[edge] = EdgeVerdict::kConfirmed; }
-  void JudgeByStart();
+  void ClassifyByStart();
   void FindPieces();
   std::vector<int> Roots() const;
   ConsensusTree BuildTree(int trial);
   double SquaredResidual(int edge) const;
-  // Of an edge's residual against orientations along the tree.
+  // Tolerance of an edge's residual against orientations along the tree.
   double ToleranceIn(const ConsensusTree& tree, int edge) const;
   bool Agrees(const ConsensusTree& tree, int edge, bool needs_evidence) const;
   bool ConfirmCycles(const ConsensusTree& tree);
@@ -55,7 +57,7 @@ class Consensus {
   bool ConfirmVotes(const ConsensusTree& tree, std::vector<int>& edges);
   void ConfirmByTrees(int first_trial);
   void ConfirmByBestTrees();
-  double DoubtOf(const ConsensusTree& tree) const;
+  double ContradictionOf(const ConsensusTree& tree) const;
 
   const ConsensusProblem& problem_;
   ConsensusGraph graph_;
@@ -65,7 +67,7 @@ class Consensus {
   std::vector<Eigen::Quaterniond> cam_from_world_;
 };
 
-void Consensus::JudgeByStart() {
+void Consensus::ClassifyByStart() {
   knowledge_.verdict.resize(problem_.edges.size());
   for (int edge = 0; edge < graph_.num_edges(); ++edge) {
     const bool agrees = SquaredResidual(edge) <= graph_.Tolerance(graph_.edge(edge).variance);
@@ -73,7 +75,7 @@ void Consensus::JudgeByStart() {
   }
 }
 
-// What confirmed edges tie together; the held views of a component are one piece.
+// Groups views that confirmed edges connect. The fixed views of a component form one group.
 void Consensus::FindPieces() {
   DisjointSets sets(problem_.num_views);
   for (int edge = 0; edge < graph_.num_edges(); ++edge) {
@@ -90,7 +92,7 @@ void Consensus::FindPieces() {
   for (int view = 0; view < problem_.num_views; ++view) knowledge_.piece[view] = sets.Find(view);
 }
 
-// The held views; in components without one, the view with the most confirmed edges.
+// The fixed views; in components without one the view with the most confirmed edges.
 std::vector<int> Consensus::Roots() const {
   std::vector<int> best(static_cast<std::size_t>(problem_.num_views), -1);
   std::vector<std::array<int, 2>> score(static_cast<std::size_t>(problem_.num_views), {-1, -1});
@@ -118,7 +120,7 @@ std::vector<int> Consensus::Roots() const {
   return roots;
 }
 
-// With orientations along it, unless they are given.
+// Builds the tree and the orientations along it, unless these are given.
 ConsensusTree Consensus::BuildTree(int trial) {
   ConsensusTree tree(graph_, knowledge_, Roots(), trial);
   if (!problem_.has_start) tree.Chain(cam_from_world_);
@@ -142,7 +144,7 @@ bool Consensus::Agrees(const ConsensusTree& tree, int edge, bool needs_evidence)
   return SquaredResidual(edge) <= tolerance;
 }
 
-// Edges outside the tree that agree with it confirm their cycles.
+// Confirms the cycles of edges outside the tree that agree with it.
 bool Consensus::ConfirmCycles(const ConsensusTree& tree) {
   DisjointSets confirmed_up(problem_.num_views);  // named by the view next to the root
   std::vector<int> top(static_cast<std::size_t>(problem_.num_views));
@@ -170,7 +172,7 @@ bool Consensus::ConfirmCycles(const ConsensusTree& tree) {
   return is_new;
 }
 
-// Edges between two pieces that agree on how these lie to each other.
+// Confirms edges between two groups that agree on the rotation between the groups.
 bool Consensus::ConfirmByVotes(const ConsensusTree& tree) {
   std::vector<std::tuple<int, int, int>> between;  // piece, piece, edge
   for (int edge = 0; edge < graph_.num_edges(); ++edge) {
@@ -254,8 +256,8 @@ void Consensus::ConfirmByTrees(int first_trial) {
   }
 }
 
-// Among many long cycles of wrong edges some close by chance, and what they confirm stays. Other
-// trees, which go other ways, then have fewer edges against them.
+// Some of many long cycles of wrong edges close by chance, and the confirmations persist. Other
+// trees have other cycles, and the right one contradicts fewer edges.
 void Consensus::ConfirmByBestTrees() {
   if (graph_.num_edges() == 0) return;
   const int max_beginnings =
@@ -267,10 +269,10 @@ void Consensus::ConfirmByBestTrees() {
   const EdgeKnowledge by_short_cycles = knowledge_;
   EdgeKnowledge best;
   double least_doubt = std::numeric_limits<double>::infinity();
-  for (int k = 0; k < max_beginnings && least_doubt > kLittleDoubt; ++k) {
+  for (int k = 0; k < max_beginnings && least_doubt > kLittleContradiction; ++k) {
     knowledge_ = by_short_cycles;
     ConfirmByTrees(k * kTrialsPerBeginning);
-    const double doubt = DoubtOf(BuildTree(0));
+    const double doubt = ContradictionOf(BuildTree(0));
     if (doubt >= least_doubt) continue;
     least_doubt = doubt;
     best = knowledge_;
@@ -278,8 +280,8 @@ void Consensus::ConfirmByBestTrees() {
   knowledge_ = std::move(best);
 }
 
-// Share of the edges that contradict a tree, those that are only inaccurate counted in part.
-double Consensus::DoubtOf(const ConsensusTree& tree) const {
+// Share of the edges that contradict a tree; inaccurate ones count in part.
+double Consensus::ContradictionOf(const ConsensusTree& tree) const {
   constexpr double kLeastTolerance = kLargestEvidence_rad * kLargestEvidence_rad;
   double sum = 0.0;
   for (int edge = 0; edge < graph_.num_edges(); ++edge) {
@@ -291,18 +293,17 @@ double Consensus::DoubtOf(const ConsensusTree& tree) const {
 
 ConsensusStart Consensus::Find() {
   if (problem_.has_start) {
-    JudgeByStart();
+    ClassifyByStart();
     FindPieces();
   } else {
-    knowledge_.verdict = JudgeByShortCycles(graph_, num_threads_);
+    knowledge_.verdict = ClassifyByShortCycles(graph_, num_threads_);
     FindPieces();
     ConfirmByBestTrees();
   }
   const ConsensusTree tree = BuildTree(0);
   ConsensusStart start;
   start.is_trusted.resize(problem_.edges.size());
-  // Where cycles are short enough to tell right from wrong, long ones that prove nothing are not
-  // believed.
+  // Where short cycles classify the edges, long cycles, which are no evidence, are not used.
   const auto confirmed =
       std::count(knowledge_.verdict.begin(), knowledge_.verdict.end(), EdgeVerdict::kConfirmed);
   const bool cycles_tell = !problem_.has_start && 2 * confirmed > graph_.num_edges();

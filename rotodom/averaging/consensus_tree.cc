@@ -10,14 +10,14 @@
 namespace rotslam {
 namespace {
 
-// Unconfirmed edges on a path count one, those that short cycles contradict more.
+// Cost of an edge in a path: unconfirmed edges, and those that short cycles contradict.
 constexpr double kUnconfirmedClass = 1.0;
 constexpr double kContradictedClass = 3.0;
 
 // Candidates for the tree, best last.
 using Candidate = std::tuple<double, double, int, int>;  // class, variance, view, edge
 
-// A number from 0 to 1 that looks random.
+// A pseudo-random number from 0 to 1.
 double Hash(std::uint64_t seed, std::uint64_t trial, std::uint64_t edge) {
   std::uint64_t z = ((seed * 0x2545f4914f6cdd1dU + trial) << 32) + edge + 0x9e3779b97f4a7c15U;
   z = (z ^ (z >> 30)) * 0xbf58476d1ce4e5b9U;

@@ -9,18 +9,19 @@
 
 namespace rotslam {
 
-/// What is known of the edges of a ConsensusGraph.
+/// State of the edges and views of a ConsensusGraph.
 struct EdgeKnowledge {
   std::vector<EdgeVerdict> verdict;  // by edge
-  std::vector<int> piece;            // by view: what confirmed edges tie together
+  std::vector<int> piece;            // by view: component over confirmed edges
   bool IsConfirmed(int edge) const { return verdict[edge] == EdgeVerdict::kConfirmed; }
 };
 
-/// Shortest paths from roots to all views: over as few unconfirmed edges as possible, then of least
-/// variance. A piece is entered once: its views lie to each other as confirmed edges say.
+/// Shortest paths from the roots to all views: as few unconfirmed edges as possible, then least
+/// variance. A path enters each group of confirmed views once, since confirmed edges relate its
+/// views.
 class ConsensusTree {
  public:
-  /// @param trial  0 for the shortest paths; others lengthen unconfirmed edges at random.
+  /// @param trial  0 for the shortest paths; other values weight unconfirmed edges at random.
   /// Cost:         O(E log E) for E edges.
   ConsensusTree(const ConsensusGraph& graph,
                 const EdgeKnowledge& knowledge,
@@ -34,11 +35,11 @@ class ConsensusTree {
   int ParentOf(int view) const { return nodes_[view].parent; }
   int EdgeAbove(int view) const { return nodes_[view].edge; }
   int DepthOf(int view) const { return nodes_[view].depth; }
-  /// -1 when the two hang on different roots.
+  /// -1 when the two have different roots.
   int CommonAncestor(int a, int b) const;
-  /// Of the turn between two views along the tree, per axis.
+  /// Variance of the rotation between two views along the tree, per axis, rad^2.
   double PathVariance(int a, int b) const;
-  /// Replaces orientations by those along the tree; held roots keep theirs, others get the
+  /// Replaces orientations by those along the tree. Fixed roots keep theirs, other roots get the
   /// identity.
   void Chain(std::vector<Eigen::Quaterniond>& cam_from_world) const;
 

@@ -12,20 +12,21 @@
 namespace rotslam {
 namespace {
 
-// Up to here the dense factorisation wins (averaging_bench: equal at about 25 views).
+// Largest number of free views for dense factorisation; both take the same time at about 25 views
+// (averaging_bench).
 constexpr int kMostDenseViews = 20;
-// Larger turns ask for new residuals: the linear ones are wrong by about half the product of turn
-// and residual, which is below 1e-6 rad for residuals of a degree.
+// Largest change, rad, for which linearised residuals are used. Their error is about half the
+// product of change and residual, below 1e-6 rad for residuals of a degree.
 constexpr double kLinearTurn = 1e-4;
-// Residuals smaller than this many standard deviations pull as least squares do.
+// Below this many standard deviations the L1 loss is quadratic.
 constexpr double kSmallestL1 = 0.1;
-// Weight of an edge whose residual is the loss' scale.
+// Weight of an edge whose residual equals the scale of the loss.
 constexpr double kContradiction = 0.25;
-// Share of the largest pivot added to all: a view whose edges have all lost their weight, or a
-// piece of the graph without an anchor, stays where it is.
+// Damping relative to the largest pivot: a view whose edges have all lost their weight, or a
+// component without an anchor, does not move.
 constexpr double kDamping = 1e-9;
-// Edges of smaller weights are left out of factorisations: wrong ones join distant views and would
-// fill them.
+// Edges with smaller weights are left out of factorisations. Wrong edges join distant views and
+// would cause fill-in.
 constexpr double kStructuralWeight = 0.1;
 constexpr int kTermsPerChunk = 4096;
 
@@ -84,7 +85,7 @@ void EdgeSystem::LinearizeTerms() {
 void EdgeSystem::LinearizeTerm(Term& term) const {
   const Eigen::Quaterniond predicted =
       cam_from_world_[term.j] * cam_from_world_[term.i].conjugate();
-  // Exp(residual) * measured = predicted, in the frame of camera j; then turned to the world's.
+  // Exp(residual) * measured = predicted, in the frame of camera j; then rotated to the world's.
   const Eigen::Matrix3d& R_j_w = R_c_w_[term.j];
   term.residual.noalias() = R_j_w.transpose() * LogOf(predicted * term.i_from_j);
   term.information.noalias() = R_j_w.transpose() * term.information_in_j * R_j_w;
@@ -114,8 +115,8 @@ Eigen::Vector3d EdgeSystem::ReweightTerm(Term& term, EdgeLoss loss) const {
   } else {
     const double ratio = 1.0 + squared / term.squared_scale;
     term.weight = 1.0 / (ratio * ratio);
-    // The loss' own second derivative, not less than half of what plain re-weighting takes: then
-    // no step goes beyond twice the re-weighted one, and the cost cannot grow.
+    // Second derivative of the loss, at least half the curvature of plain re-weighting. A step is
+    // then at most twice the re-weighted one, and the cost cannot grow.
     const double bend =
         std::min(4.0 / (term.squared_scale * ratio), 0.5 / std::max(squared, 1e-300));
     term.curvature = term.weight * (term.information - bend * pull * pull.transpose());
@@ -150,7 +151,7 @@ double EdgeSystem::Step(EdgeLoss loss) {
   return last_turn_;
 }
 
-int EdgeSystem::CountDoubtfulViews() const {
+int EdgeSystem::CountInconsistentViews() const {
   std::vector<int> balance(num_free_, 0);
   for (const Term& term : terms_) {
     const int vote = term.weight < kContradiction ? -1 : 1;

@@ -13,17 +13,16 @@
 namespace rotslam {
 
 enum class EdgeLoss {
-  kL1,            // convex: wrong edges pull by their number, not by their size
-  kGemanMcClure,  // redescending: wrong edges do not pull at all
+  kL1,            // convex: the influence of a wrong edge does not grow with its error
+  kGemanMcClure,  // redescending: the influence of a wrong edge vanishes
 };
 
-/// Robust least squares over relative rotations, made linear at the present orientations.
+/// Robust least squares over relative rotations, linearised at the present orientations.
 ///
-/// The unknowns are small turns of the cameras written in the world's frame,
-/// cam_from_world * Exp(turn). There an edge's residual is r + turn_j - turn_i, so that the normal
-/// equations are the weighted Laplacian of the graph: a step costs a few additions an edge and one
-/// solution of it, by dense Cholesky factorisation for few unknown orientations and by
-/// LaplacianSolver for many.
+/// The unknowns are small rotations of the cameras in the world's frame, cam_from_world *
+/// Exp(turn). The residual of an edge is then r + turn_j - turn_i, and the normal equations are the
+/// weighted Laplacian of the graph: a step costs a few additions per edge and one solution of it,
+/// by dense Cholesky factorisation for few free orientations and by LaplacianSolver for many.
 class EdgeSystem {
  public:
   /// An edge between two positions in the list of orientations, in the world's frame.
@@ -39,9 +38,9 @@ class EdgeSystem {
     Eigen::Matrix3d curvature;         // of the loss, what the edge adds to the normal equations
   };
 
-  /// @param cam_from_world  orientations; the first `num_free` are unknown, the others held.
+  /// @param cam_from_world  orientations; the first `num_free` are unknowns, the others are fixed.
   /// @param loss_sigmas     scale of the Geman-McClure loss, in standard deviations.
-  /// @param num_threads     for systems that are worth it; the answer does not depend on it.
+  /// @param num_threads  used for large systems; the result does not depend on it.
   EdgeSystem(std::vector<Eigen::Quaterniond> cam_from_world,
              int num_free,
              double loss_sigmas,
@@ -52,22 +51,23 @@ class EdgeSystem {
   /// delta in `Exp(delta) * j_from_i`.
   void AddEdge(int i, int j, const Rotation& j_from_i, const Eigen::Matrix3d& covariance);
 
-  /// One re-weighted Gauss-Newton step. Returns the largest turn of an orientation in radians, or
-  /// a negative number when the equations have no finite solution (the orientations then stay).
+  /// One re-weighted Gauss-Newton step. Returns the largest change of an orientation in radians, or
+  /// a negative number when the equations have no finite solution; the orientations are then
+  /// unchanged.
   double Step(EdgeLoss loss = EdgeLoss::kGemanMcClure);
 
-  /// Another scale of the loss for one edge, in the order in which they came: larger ones let wrong
-  /// starts pull themselves right.
+  /// Sets the scale of the loss for one edge, numbered in the order of AddEdge. Larger scales let
+  /// edges correct a wrong start.
   void SetLossSigmas(int edge, double loss_sigmas) {
     terms_[edge].squared_scale = loss_sigmas * loss_sigmas;
   }
 
-  /// Free views whose edges mostly contradict the present orientations: they lie beyond the loss'
-  /// scale. The last step must have been, or be preceded by, `Linearize`.
-  int CountDoubtfulViews() const;
+  /// Number of free views for which most edges contradict the present orientations: their residuals
+  /// exceed the scale of the loss. Call after `Step` or `Linearize`.
+  int CountInconsistentViews() const;
 
-  /// The turn in the last step that no more than this share of the free views exceeded, of those
-  /// with an edge that agrees. Views whose other edges are wrong may wander for long.
+  /// Change in the last step that at most this share of the free views exceeded, among views with
+  /// an edge that agrees. Views with wrong edges only may go on changing for long.
   double AgreedTurn(double exceeding_share) const;
 
   /// Residuals and weights at the present orientations.

@@ -13,17 +13,17 @@
 namespace rotslam {
 namespace {
 
-// The L1 stage is a start: it need not be finished.
+// The L1 stage stops at steps below this: it only computes a start.
 constexpr double kL1Step_rad = 1e-3;
-// Share of the views that may still turn at the end: some hang on wrong edges alone.
-constexpr double kWanderers = 0.005;
-// Share of the views that the start must contradict before all are moved by the L1 cost.
-constexpr double kDoubtful = 0.25;
-// A trusted edge begins with a loss of this many times its residual: that is nearly quadratic,
-// where twice the residual would make steps twice as long as the cost allows.
+// Share of the views that may still change at the end: some have wrong edges only.
+constexpr double kUnsettledShare = 0.005;
+// Share of the views with mostly contradicting edges at which the L1 stage runs.
+constexpr double kInconsistentShare = 0.25;
+// Initial scale of the loss of a trusted edge, as a multiple of its residual: nearly quadratic.
+// With twice the residual steps would be twice too long.
 constexpr double kFirstLoss = 10.0;
-// Errors that last make the variances of orientations some 30 times too small over 160 frames
-// (AveragingOptions::lasting_share).
+// Ratio of an odometry's errors to those from independent edges; its square is the factor 30 by
+// which correlated errors increase the variances over 160 frames (AveragingOptions::lasting_share).
 constexpr double kOdometryDrift = 5.5;
 
 // Views by position, ascending.
@@ -39,7 +39,7 @@ struct Views {
 void CheckProblem(const GlobalAveragingProblem& problem) {
   for (const FrameId view : problem.held_views) {
     if (!problem.cam_from_world.contains(view)) {
-      throw std::invalid_argument("AverageGlobally: a held view has no orientation");
+      throw std::invalid_argument("AverageGlobally: a fixed view has no orientation");
     }
   }
   for (const RelativeRotation& edge : problem.edges) {
@@ -115,8 +115,9 @@ ConsensusStart FindStart(const GlobalAveragingProblem& problem,
   return FindConsensusStart(consensus, num_threads);
 }
 
-// Components without a held view begin at the orientation given for their first view, or at the
-// identity. The solver held another one: a first view may hang on a few doubtful edges.
+// In components without a fixed view, the first view gets the orientation given for it, or the
+// identity. The solver had fixed another view, since the first one may have only a few unreliable
+// edges.
 void FixGauge(const GlobalAveragingProblem& problem, GlobalAveragingResult& result) {
   std::vector<char> is_free(result.component_sizes.size(), 1);
   for (const FrameId view : problem.held_views) is_free[result.component.at(view)] = 0;
@@ -185,7 +186,7 @@ void Minimize(EdgeSystem& system,
     system.SetLossSigmas(static_cast<int>(k), loss[k]);
   }
   system.Linearize();
-  if (system.CountDoubtfulViews() > kDoubtful * system.num_free()) {
+  if (system.CountInconsistentViews() > kInconsistentShare * system.num_free()) {
     for (int iteration = 0; iteration < options.l1_iterations; ++iteration) {
       ++result.iterations;
       if (system.Step(EdgeLoss::kL1) < kL1Step_rad) break;
@@ -202,7 +203,7 @@ void Minimize(EdgeSystem& system,
       has_shrunk = true;
     }
     result.has_converged =
-        !has_shrunk && system.AgreedTurn(kWanderers) < options.min_step_deg * kRadFromDeg;
+        !has_shrunk && system.AgreedTurn(kUnsettledShare) < options.min_step_deg * kRadFromDeg;
     if (result.has_converged) return;
   }
 }

@@ -60,20 +60,20 @@ struct GlobalAveragingOptions {
 };
 
 struct GlobalAveragingProblem {
-  // In any order and direction, several of one pair allowed.
+  // In any order and direction; several edges of one pair are allowed.
   std::span<const RelativeRotation> edges;
-  // Orientations of held views; with `use_start` a start for the others, too, when it names every
-  // view of the edges.
+  // Orientations of the fixed views; with `use_start` also start values of the others, if it names
+  // every view of the edges.
   RotationMap cam_from_world;
   bool use_start = true;
-  // Views that keep their orientation, several in a component allowed.
+  // Views with fixed orientations; a component may have several.
   std::set<FrameId> held_views;
 };
 
 struct GlobalAveragingResult {
   RotationMap cam_from_world;
-  // Connected pieces of the graph, numbered by their first views, and how many views they have.
-  // Their orientations have nothing to do with each other.
+  // Connected components of the graph, numbered by their first views, and their numbers of views.
+  // Orientations of different components are not related.
   std::map<FrameId, int> component;
   std::vector<int> component_sizes;
   // By edge, as given.
@@ -86,13 +86,12 @@ struct GlobalAveragingResult {
   bool has_converged = false;
 };
 
-/// Finds the orientations that agree best with relative rotations, of which many may be wrong:
-/// a start along a tree that cycles confirm (FindConsensusStart), then iteratively re-weighted
-/// least squares in the tangent space with edges weighted by their covariances.
-/// @return  orientations of all views that edges or held_views name. A component without a held
-/// view
-///          has its first view where `cam_from_world` has it, else at the identity.
-/// Throws std::invalid_argument when an option is out of range, a held view has no orientation, an
+/// Finds the orientations that agree best with relative rotations, of which many may be wrong: a
+/// start along a tree that cycles confirm (FindConsensusStart), then iteratively re-weighted least
+/// squares in the tangent space with edges weighted by their covariances.
+/// @return  orientations of all views of edges and held_views. In a component without a fixed view
+///          the first view has its orientation of `cam_from_world`, else the identity.
+/// Throws std::invalid_argument when an option is out of range, a fixed view has no orientation, an
 /// edge joins a view with itself or its covariance is not positive definite.
 /// Error:   the robust cost's minimum nearest to the start, to min_step_deg.
 /// Cost:    tests/bench/global_averaging_bench.cc.
@@ -102,10 +101,10 @@ GlobalAveragingResult AverageGlobally(const GlobalAveragingProblem& problem,
                                       const GlobalAveragingOptions& options,
                                       int num_threads);
 
-/// The same for an odometry whose present orientations have drifted and whose view-graph has new
-/// edges between its past and its present: all views are turned, the first one held. A loop is
-/// adopted when it disagrees by no more than the drift that the edges on the way let expect,
-/// however many deviations of its own that is.
+/// The same for the drifted orientations of an odometry and a view-graph with loops: all views are
+/// averaged with the first one fixed. A loop is accepted when it disagrees by no more than the
+/// drift expected from the edges between its ends, however many of its own standard deviations that
+/// is.
 /// @param edges           of the view-graph.
 /// @param cam_from_world  start, of all views of the edges.
 /// Cost:    tens of milliseconds for some thousand views.

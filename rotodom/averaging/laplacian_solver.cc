@@ -10,15 +10,15 @@
 namespace rotslam {
 namespace {
 
-constexpr double kTolerance = 1e-4;
-constexpr int kMaxIterations = 300;
-// A factorisation is made anew when the old one took more iterations than this: one costs about as
-// much as so many products on graphs of streets.
+constexpr double kTolerance = 1e-4;  // relative residual: Gauss-Newton corrects the rest
+constexpr int kMaxIterations = 300;  // of conjugate gradients
+// Iterations above which the matrix is factorised again: on graphs of streets a factorisation costs
+// about as many products.
 constexpr int kStaleIterations = 12;
-// Multiplications per edge and at least, up to which a factorisation is cheaper than the many
-// iterations that it saves.
+// Multiplications per edge, and in all, up to which a factorisation is cheaper than the iterations
+// that it saves.
 constexpr double kMaxProductsPerEdge = 2e4;
-constexpr double kAlwaysBearable = 1e7;
+constexpr double kAlwaysAffordable = 1e7;
 
 double ScalarWeight(const LaplacianEdge& edge) { return edge.curvature.trace() / 3.0; }
 
@@ -59,7 +59,7 @@ void LaplacianSolver::Analyze(std::span<const LaplacianEdge> edges) {
   upper_.resize(num_free_, num_free_);
   upper_.setFromTriplets(entries.begin(), entries.end());
   is_analyzed_ = true;
-  uses_factor_ = FillIsBearable(upper_, edges.size());
+  uses_factor_ = FillIsAffordable(upper_, edges.size());
   edge_place_.assign(edges.size(), -1);
   if (!uses_factor_) return;
 
@@ -81,10 +81,10 @@ void LaplacianSolver::Analyze(std::span<const LaplacianEdge> edges) {
 
 // Counts the factor's columns by walking up the elimination tree, row by row (Davis, Direct Methods
 // for Sparse Linear Systems, ch. 4), and stops when they are too many.
-bool LaplacianSolver::FillIsBearable(const Eigen::SparseMatrix<double>& upper,
-                                     std::size_t num_edges) const {
+bool LaplacianSolver::FillIsAffordable(const Eigen::SparseMatrix<double>& upper,
+                                       std::size_t num_edges) const {
   const double limit =
-      std::max(kAlwaysBearable, kMaxProductsPerEdge * static_cast<double>(num_edges));
+      std::max(kAlwaysAffordable, kMaxProductsPerEdge * static_cast<double>(num_edges));
   std::vector<int> parent(static_cast<std::size_t>(num_free_), -1);
   std::vector<int> visited(static_cast<std::size_t>(num_free_), -1);
   std::vector<std::int64_t> count(static_cast<std::size_t>(num_free_), 0);

@@ -15,26 +15,26 @@ struct LaplacianEdge {
   int i = 0;
   int j = 0;
   Eigen::Matrix3d curvature = Eigen::Matrix3d::Zero();  // positive semi-definite
-  bool is_structural = true;  // false: too light for its place in the factorisation
+  bool is_structural = true;  // false: its weight is too small to be part of the factorisation
 };
 
-/// Solves sparse systems whose matrix is the sum of `curvature` over the edges' ends, plus a small
-/// multiple of the identity: the normal equations of rotation averaging.
+/// Solves the normal equations of rotation averaging: sparse systems whose matrix is the Laplacian
+/// of the graph with 3x3 blocks `curvature`, plus a small multiple of the identity.
 ///
-/// Conjugate gradients on the whole matrix, preconditioned by a Cholesky factorisation of the
-/// scalar Laplacian with a third of the curvatures' traces as weights: nine times fewer numbers
-/// than blocks have, and the exact inverse where all curvatures are isotropic. The order of
-/// elimination is kept while the structural edges stay, the factorisation while it serves. Where
-/// the factor would fill (edges at random across a large graph), the diagonal blocks do: such
-/// graphs mix fast.
-/// The factorisation is Eigen's: CHOLMOD's simplicial one takes as long, its supernodal one, under
-/// the GPL, half as long from some 100,000 views on (tests/bench/cholesky_bench.cc).
+/// Conjugate gradients are preconditioned by a Cholesky factorisation of the scalar Laplacian with
+/// a third of the curvatures' traces as weights. It has nine times fewer entries than the block
+/// matrix, and is the exact inverse where all curvatures are isotropic. The elimination order is
+/// kept while the structural edges do not change, and the factorisation while the number of
+/// iterations stays small. Where the factor would fill in (random edges across a large graph) the
+/// diagonal blocks are the preconditioner; such graphs need few iterations.
+/// The factorisation is Eigen's. CHOLMOD's simplicial one takes as long; its supernodal one, under
+/// the GPL, takes half as long from some 100,000 views on (tests/bench/cholesky_bench.cc).
 class LaplacianSolver {
  public:
-  /// The first `num_free` of the edges' positions are unknown, the others zero.
+  /// Positions below `num_free` are unknown; the solution at the others is zero.
   explicit LaplacianSolver(int num_free);
 
-  /// Replaces `x`, 3 num_free numbers, by the solution for it as right side.
+  /// Solves for the right-hand side `x` of 3 num_free numbers, and replaces it by the solution.
   /// @param damping  share of the largest pivot added to all.
   /// @return  false when there is no finite solution.
   /// Error:   relative residual 1e-4, in the norm of the preconditioner.
@@ -50,7 +50,7 @@ class LaplacianSolver {
   bool HasNewStructure(std::span<const LaplacianEdge> edges) const;
   void Analyze(std::span<const LaplacianEdge> edges);
   bool Factorize(std::span<const LaplacianEdge> edges);
-  bool FillIsBearable(const Eigen::SparseMatrix<double>& upper, std::size_t num_edges) const;
+  bool FillIsAffordable(const Eigen::SparseMatrix<double>& upper, std::size_t num_edges) const;
   void SetDiagonal(std::span<const LaplacianEdge> edges, double damping);
   void Multiply(std::span<const LaplacianEdge> edges,
                 const Eigen::VectorXd& x,

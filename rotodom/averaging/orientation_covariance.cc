@@ -14,7 +14,7 @@
 namespace rotslam {
 namespace {
 
-// A view that nothing ties to those before may be turned by anything.
+// Variance of a view without an edge to earlier views, rad^2: its orientation is unknown.
 constexpr double kUnknownVariance = std::numbers::pi * std::numbers::pi;
 
 std::vector<std::uint64_t> Bits(std::span<const std::array<int, 2>> pairs, int end) {
@@ -58,7 +58,7 @@ void OrientationCovariance::AddView(FrameId view,
                                     const RotationMap& cam_from_world,
                                     const std::set<FrameId>& free_views) {
   for (int slot = 0; slot < static_cast<int>(views_.size()); ++slot) {
-    // Views that the last solve still moved and this one does not.
+    // Views that were free in the last solve and are fixed in this one.
     if (views_[slot].is_used && !views_[slot].is_settled && !free_views.contains(views_[slot].id)) {
       Settle(slot);
     }
@@ -169,13 +169,13 @@ void OrientationCovariance::AddEdge(const SupportedEdge& supported,
   edge.num_keypoints = static_cast<int>(supported.keypoint_pairs.size());
   edge.keypoints_i = Bits(supported.keypoint_pairs, 0);
   edge.keypoints_j = Bits(supported.keypoint_pairs, 1);
-  // Both of its ends bring one unit of noise.
+  // Each of its two views contributes one unit of noise.
   edge.shared.push_back({slot, 2.0});
   for (int other = 0; other < static_cast<int>(edges_.size()); ++other) {
     Edge& neighbour = edges_[other];
     if (other == slot || !neighbour.is_used) continue;
     const double share = Share(edge, neighbour);
-    // What is too small to matter costs as much time as the rest.
+    // Small correlations would cost time without an effect.
     if (std::abs(share) < 0.1) continue;
     edge.shared.push_back({other, share});
     neighbour.shared.push_back({slot, share});
@@ -193,7 +193,7 @@ double OrientationCovariance::LastingIntegral(int views) {
 }
 
 double OrientationCovariance::LastingCorrelation(const Edge& a, const Edge& b) {
-  // What is left after so long is not worth its time.
+  // Correlations are negligible after this time.
   const double gap = std::max(a.begin - b.end, b.begin - a.end);
   if (gap > 4.0 * options_.lasting_views) return 0.0;
   const double common =
@@ -207,7 +207,7 @@ double OrientationCovariance::Share(const Edge& a, const Edge& b) {
   double share = 0.0;
   if (options_.lasting_share > 0.0) share = 2.0 * options_.lasting_share * LastingCorrelation(a, b);
   int common = 0;
-  // Noise in a frame turns the edges that end there one way, those that begin there the other.
+  // Noise in a frame has opposite signs in edges that end and in edges that begin there.
   if (a.i == b.i) common += CountCommon(a.keypoints_i, b.keypoints_i);
   if (a.j == b.j) common += CountCommon(a.keypoints_j, b.keypoints_j);
   if (a.i == b.j) common -= CountCommon(a.keypoints_i, b.keypoints_j);
@@ -231,7 +231,7 @@ void OrientationCovariance::DropOldViews() {
       if (edge.j == slot) edge.j = -1;
     }
   }
-  // An edge is remembered for the edges to come at its views.
+  // An edge is kept while new edges may share its views.
   for (int slot = 0; slot < static_cast<int>(edges_.size()); ++slot) {
     Edge& edge = edges_[slot];
     if (!edge.is_used || edge.i >= 0 || edge.j >= 0) continue;

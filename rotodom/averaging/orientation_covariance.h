@@ -17,29 +17,29 @@ namespace rotslam {
 /// An edge and the keypoints it rests on.
 struct SupportedEdge {
   RelativeRotation edge;
-  // Indices of the matched keypoints in frames edge.i and edge.j, inliers only; empty when they are
-  // not known: then the edge's error counts as independent of all others.
+  // Indices of the matched keypoints in frames edge.i and edge.j, inliers only. Empty when they are
+  // not known; the edge's error then counts as independent of all others.
   std::span<const std::array<int, 2>> keypoint_pairs;
 };
 
-/// Covariances of orientations against the first view, frame by frame beside `AverageRotations`.
+/// Computes the covariances of orientations relative to the first view, frame by frame alongside
+/// `AverageRotations`.
 ///
-/// The averaged orientations of a window are, to first order, a linear function of the anchors'
-/// errors and of the edges' errors, so their covariance follows from those two ("sandwich"), which
+/// The averaged orientations of a window are, to first order, a linear function of the errors of
+/// the anchors and of the edges. Their covariance follows from those two ("sandwich" estimator). It
 /// differs from the inverse of the normal equations in four ways:
-/// - Edges share noise. Half of an edge's covariance comes from the keypoints' noise in either
-///   frame; two edges that meet in a frame have the part in common that belongs to the keypoints
-///   they share. Along a track that noise of the frames between cancels, over several edges of one
-///   frame it does not average out.
-/// - Tracked patches slide, and go on sliding: part of the error builds up at a rate that changes
-///   slowly, so edges over the same or neighbouring frames have it in common. Along a track it adds
-///   up (AveragingOptions::lasting_share).
-/// - The weights may be anything (floor, robust loss): they say how edges enter, not how wrong
-///   they are.
-/// - Anchors are uncertain, and correlated with each other and with the edges at them. A view that
-///   leaves the window keeps its covariance and its part in the edges that are remembered.
-/// Memory and time do not depend on the length of the sequence: held views are forgotten once they
-/// have had no new edge for a window's length.
+/// - Edges share noise. Half of an edge's covariance comes from the keypoint noise in either frame;
+/// two edges with a common frame share the noise of their common keypoints. Along a track the noise
+/// of the frames in between cancels; over several edges of one frame it does not average out.
+/// - Tracked patches slide slowly. This error accumulates at a slowly changing rate, so that edges
+/// over the same or neighbouring frames share it, and along a track it adds up
+/// (AveragingOptions::lasting_share).
+/// - Weights of the robust loss and edge_floor_deg determine the influence of an edge, not its
+/// error.
+/// - Anchors are uncertain, and correlated with each other and with their edges. A view that leaves
+/// the window keeps its covariance and its part in the edges that are kept.
+/// Memory and time do not depend on the length of the sequence: a fixed view is dropped once it has
+/// had no new edge for the length of a window.
 /// Cost:    0.05 ms a frame at 10 free views with 5 edges each, the covariances of the newest view
 ///          and of the one that leaves the window included (tests/bench/averaging_bench.cc); 0.2 ms
 ///          on real sequences, whose edges have more points in common.
@@ -52,32 +52,31 @@ class OrientationCovariance {
   /// Throws std::invalid_argument when an option is out of range.
   explicit OrientationCovariance(const AveragingOptions& options);
 
-  /// Takes a new view once the orientations have been averaged.
-  /// @param edges           new edges of `view` to older ones. With averaging off: the one edge
-  ///                        that it is chained to. Edges to forgotten views are ignored.
+  /// Adds a new view after the orientations have been averaged.
+  /// @param edges  new edges of `view` to older views; with averaging off the one edge that it is
+  ///               chained to. Edges to dropped views are ignored.
   /// @param cam_from_world  averaged orientations.
-  /// @param free_views      what was averaged; with mode global the newest options.window views,
-  ///                        with mode off `view` alone.
-  /// A view without an edge, other than the first one ever, can be turned by anything.
+  /// @param free_views  the averaged views; with mode global the newest options.window views, with
+  ///                    mode off `view` alone.
+  /// The orientation of a view without an edge, other than the first one, is unknown.
   void AddView(FrameId view,
                std::span<const SupportedEdge> edges,
                const RotationMap& cam_from_world,
                const std::set<FrameId>& free_views);
 
-  /// False for a forgotten view. AddView asks for the orientations of all others.
+  /// False for a dropped view. AddView needs the orientations of all others.
   bool Holds(FrameId view) const { return SlotOf(view) >= 0; }
 
   /// Covariance of the error delta in `Exp(delta) * cam_from_world` of a view, rad^2, in the
-  /// camera's frame; nullopt for a forgotten view. Right for the orientation that the view had
-  /// after the last AddView.
+  /// camera's frame; nullopt for a dropped view. It belongs to the orientation after the last
+  /// AddView.
   std::optional<Eigen::Matrix3d> Of(FrameId view) const;
 
-  /// Covariance of the error delta in `Exp(delta) * j_from_i` of the turn between two views, rad^2,
-  /// in the frame of camera j: what the two have in common is left out. Otherwise as Of().
+  /// Covariance of the error delta in `Exp(delta) * j_from_i` of the rotation between two views,
+  /// rad^2, in the frame of camera j; their common error cancels. Otherwise as Of().
   std::optional<Eigen::Matrix3d> Between(FrameId i, FrameId j) const;
 
-  /// All that later views depend on but for the options, to and from bytes
-  /// (rotodom/types/archive.h).
+  /// Saves or restores the state, except the options (rotodom/types/archive.h).
   template <class Archive>
   void Transfer(Archive& archive) {
     archive(num_added_, view_capacity_, views_, edges_, anchor_covariance_, gains_);
@@ -87,11 +86,11 @@ class OrientationCovariance {
  private:
   struct View {
     FrameId id;
-    bool is_used = false;     // slots are used again
+    bool is_used = false;     // unused slots are used again
     int number = 0;           // 1 for the first view ever, and so on
-    bool is_settled = false;  // held from now on; its rows of the covariance and gains are final
-    int last_edge = 0;        // when it had its last new edge, counted in views
-    int position = -1;        // among the free views of the system, -1 when held
+    bool is_settled = false;  // fixed; its rows of the covariance and gains are final
+    int last_edge = 0;        // number of the view that brought its last new edge
+    int position = -1;        // among the free views of the system, -1 when fixed
     Eigen::Matrix3d R_c_w = Eigen::Matrix3d::Identity();
 
     template <class Archive>
@@ -110,7 +109,7 @@ class OrientationCovariance {
   };
   struct Edge {
     bool is_used = false;
-    int i = 0;  // slots of its views, -1 when forgotten
+    int i = 0;  // slots of its views, -1 when dropped
     int j = 0;
     Rotation j_from_i;
     Eigen::Matrix3d covariance_in_j = Eigen::Matrix3d::Zero();
@@ -122,7 +121,7 @@ class OrientationCovariance {
     std::vector<std::uint64_t> keypoints_i;  // as bits
     std::vector<std::uint64_t> keypoints_j;
     std::vector<Shared> shared;                           // itself first
-    Eigen::Matrix3d curvature = Eigen::Matrix3d::Zero();  // what it weighs in the system
+    Eigen::Matrix3d curvature = Eigen::Matrix3d::Zero();  // its weight in the system
 
     template <class Archive>
     void Transfer(Archive& archive) {
@@ -130,7 +129,7 @@ class OrientationCovariance {
       archive(keypoints_i, keypoints_j, shared, curvature);
     }
   };
-  // How one view's error follows from those of anchors and edges.
+  // The error of one view as a linear function of those of anchors and edges.
   struct Row {
     std::vector<Eigen::Matrix3d> from_anchor;  // by view slot
     std::vector<Eigen::Matrix3d> gain;         // by edge slot: of the whitened error, directly
@@ -145,7 +144,8 @@ class OrientationCovariance {
   int NewView(FrameId view);
   void AddEdge(const SupportedEdge& supported, const RotationMap& cam_from_world);
   double Share(const Edge& a, const Edge& b);
-  // Of what builds up over the two edges at a rate with correlation exp(-|t| / lasting_views).
+  // Covariance of the sliding errors of two edges, whose rate has the correlation exp(-|t| /
+  // lasting_views).
   double LastingCorrelation(const Edge& a, const Edge& b);
   // Second integral of the rate's correlation at this distance.
   double LastingIntegral(int views);
@@ -161,8 +161,8 @@ class OrientationCovariance {
   int view_capacity_ = 0;
   std::vector<View> views_;
   std::vector<Edge> edges_;
-  std::vector<Eigen::Matrix3d> anchor_covariance_;  // view_capacity_ squared, held views
-  std::vector<Eigen::Matrix3d> gains_;              // held views' errors from whitened edge errors
+  std::vector<Eigen::Matrix3d> anchor_covariance_;  // view_capacity_ squared, fixed views
+  std::vector<Eigen::Matrix3d> gains_;  // errors of fixed views from whitened edge errors
   std::vector<int> system_edges_;
   std::vector<double> lasting_integrals_;  // by distance, as far as needed
   Eigen::MatrixXd normal_root_;            // Cholesky factor of the present system

@@ -2,8 +2,8 @@
 
 namespace rotslam {
 
-/// Whether this machine has AVX2. Loops that gain from it exist twice, one compiled for it; both
-/// give the same bytes.
+/// Whether this machine has AVX2. Some loops are compiled twice, with and without AVX2; both
+/// variants give identical results.
 inline bool HasAvx2() {
 #if defined(__x86_64__)
   static const bool has = __builtin_cpu_supports("avx2") != 0;

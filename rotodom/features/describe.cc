@@ -13,7 +13,7 @@
 namespace rotslam {
 namespace {
 
-// A copy of the pixels around a place, the image continued by its mirror image.
+// A copy of the pixels around a position; outside of the image they are mirrored.
 template <int kBefore, int kSize>
 class MirroredPatch {
  public:
@@ -43,14 +43,14 @@ bool IsInside(const cv::Mat& image, const cv::Point& center, int reach) {
          center.y < image.rows - reach;
 }
 
-// The blurred image in the blocks around the centers; elsewhere its pixels mean nothing. It is as
-// large as whole blocks.
+// Blurs the blocks around the centres. Other pixels of the result are undefined. Its size is
+// rounded up to whole blocks.
 cv::Mat BlurAround(const cv::Mat& image, const std::vector<cv::Point>& centers) {
   const int columns = (image.cols + kBlurBlock - 1) / kBlurBlock;
   const int rows = (image.rows + kBlurBlock - 1) / kBlurBlock;
   std::vector<char> needed(static_cast<std::size_t>(columns) * rows, 0);
   for (const cv::Point& center : centers) {
-    // Of a patch that leaves the image, its mirror image lies within twice the reach of the border.
+    // A patch that leaves the image is mirrored, from pixels within twice the reach of the border.
     const int reach = IsInside(image, center, kOrbReach) ? kOrbReach : 2 * kOrbReach;
     const int first_row = std::max(0, center.y - reach) / kBlurBlock;
     const int last_row = std::min(image.rows - 1, center.y + reach) / kBlurBlock;
@@ -86,7 +86,7 @@ cv::Mat BlurAround(const cv::Mat& image, const std::vector<cv::Point>& centers) 
 }
 
 float AngleDegAt(const cv::Mat& image, const cv::Point& center) {
-  // One column more than the disc has is read.
+  // The loop reads one column beyond the disc.
   constexpr int kReach = kOrbHalfPatch + 1;
   if (IsInside(image, center, kReach)) {
     return CentroidAngleDeg(image.ptr<std::uint8_t>(center.y) + center.x,

@@ -10,7 +10,8 @@
 namespace rotslam {
 namespace {
 
-// Corners nearer to the border have no whole patch to describe or to track.
+// Smallest distance of a corner from the border, pixels: closer ones have no complete patch for
+// description and tracking.
 constexpr int kBorder = 19;
 
 // Features per level, proportional to the level's side length as in ORB; they sum to max_features.
@@ -32,15 +33,16 @@ std::vector<int> CountsPerLevel(const FeatureOptions& options) {
   return counts;
 }
 
-// How many new features each level may have. Where one holds more than its count, the others give
-// up in proportion what is too much in all.
-std::vector<int> RoomPerLevel(const std::vector<int>& counts, const std::vector<int>& held) {
+// Number of new features per level. Where a level carries more than its count, the others are
+// reduced in proportion to the total excess.
+std::vector<int> RoomPerLevel(const std::vector<int>& counts,
+                              const std::vector<int>& carried_counts) {
   std::vector<int> room(counts.size());
   int left = 0;  // in all
   int open = 0;  // on levels that are not full
   for (std::size_t level = 0; level < counts.size(); ++level) {
-    left += counts[level] - held[level];
-    room[level] = std::max(0, counts[level] - held[level]);
+    left += counts[level] - carried_counts[level];
+    room[level] = std::max(0, counts[level] - carried_counts[level]);
     open += room[level];
   }
   if (left <= 0) return std::vector<int>(counts.size(), 0);
@@ -135,7 +137,7 @@ Candidates SortIntoCells(const std::vector<FastCorner>& corners,
   return candidates;
 }
 
-// The positions on a level that a new corner keeps its distance from.
+// Positions on a level from which new corners keep the minimum distance.
 class Taken {
  public:
   Taken(const Grid& grid, double min_distance_px)
@@ -167,12 +169,13 @@ class Taken {
   std::vector<std::vector<Eigen::Vector2d>> positions_;
 };
 
-// Each turn gives every cell its best corner that is left; a cell takes part when as many turns are
-// over as it holds carried features. Ends when `count` are chosen.
-std::vector<cv::Point> ChooseByTurns(Candidates candidates,
-                                     const Grid& grid,
-                                     int count,
-                                     Taken& taken) {
+// Selects corners in rounds: each round takes the best remaining corner of every cell. A cell takes
+// part once as many rounds are over as it has carried features. Ends when `count` corners are
+// selected.
+std::vector<cv::Point> ChooseInRounds(Candidates candidates,
+                                      const Grid& grid,
+                                      int count,
+                                      Taken& taken) {
   std::vector<int> end_of_cell(candidates.begin_of_cell.begin() + 1,
                                candidates.begin_of_cell.end());
   std::vector<int> first_turn(grid.num_cells());
@@ -235,7 +238,7 @@ std::vector<cv::Point> DetectOnLevel(const cv::Mat& image,
   Taken taken(grid, options.min_distance_px);
   for (const Eigen::Vector2d& position : carried) taken.Add(position);
   const std::vector<FastCorner> corners = FindFastCorners(image, area, options.min_fast_threshold);
-  return ChooseByTurns(SortIntoCells(corners, grid, options.fast_threshold), grid, room, taken);
+  return ChooseInRounds(SortIntoCells(corners, grid, options.fast_threshold), grid, room, taken);
 }
 
 }  // namespace
@@ -269,11 +272,11 @@ void DetectFeatures(const ImagePyramid& pyramid,
     }
     carried[level].push_back(pyramid.ToLevel(features.keypoints_px[k], level));
   }
-  std::vector<int> held(num_levels);
+  std::vector<int> carried_counts(num_levels);
   for (int level = 0; level < num_levels; ++level) {
-    held[level] = static_cast<int>(carried[level].size());
+    carried_counts[level] = static_cast<int>(carried[level].size());
   }
-  const std::vector<int> room = RoomPerLevel(counts, held);
+  const std::vector<int> room = RoomPerLevel(counts, carried_counts);
   std::vector<std::vector<cv::Point>> corners(num_levels);
   ParallelFor(num_levels, num_threads, [&](int level) {
     corners[level] =

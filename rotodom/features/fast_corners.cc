@@ -14,8 +14,8 @@ namespace {
 
 using Byte = std::uint8_t;
 
-// Pixels of a row handled together; loops over them have no branches, so that the compiler turns
-// them into vector instructions.
+// Pixels of a row processed together. Loops over them have no branches, so that the compiler
+// vectorises them.
 constexpr int kChunk = 32;
 
 // From a pixel to the 16 on the circle around it, in order.
@@ -55,7 +55,7 @@ ROTSLAM_ALWAYS_INLINE Byte LargestPossibleDifference(const Byte* p, const Circle
   return largest;
 }
 
-// Scores plus one of the pixels from `p` on, 0 for what is no corner.
+// Scores plus one of the pixels from `p` on; 0 for pixels that are no corners.
 ROTSLAM_ALWAYS_INLINE void ScoreChunk(const Byte* p,
                                       const Circle& circle,
                                       Byte threshold,
@@ -119,8 +119,8 @@ ROTSLAM_TARGET_AVX2 void ScoreRowAvx2(
   ScoreRowInline(row, circle, count, threshold, score);
 }
 
-// Appends the pixels of a row of scores that beat their eight neighbours. The three rows may be
-// read from -1 to a chunk beyond `count`.
+// Appends the pixels of a row whose scores exceed those of their eight neighbours. The three rows
+// may be read from -1 to a chunk beyond `count`.
 void AppendMaxima(const Byte* above,
                   const Byte* here,
                   const Byte* below,

@@ -60,17 +60,16 @@ struct Features {
   std::vector<Eigen::Vector3d> bearings;      // unit, of keypoints_px
   std::vector<int> levels;                    // pyramid level, 0 is the full image
   std::vector<std::array<std::uint8_t, 3>> rgb;
-  // By the tracker: of keypoints_px, px^2, from the patch's structure and residual; zero for a new
-  // corner, whose patch is what later frames look for. The relative rotation does not weight
-  // matches by them: on real sequences that measured no gain (own error on KITTI 0.0045 -> 0.0053
-  // deg), because what limits them is common to neighbouring patches.
+  // Covariances of keypoints_px, px^2, set by the tracker from the patch's structure and residual;
+  // zero for a new corner, whose patch is the reference of later frames. The relative rotation does
+  // not weight matches by them: the errors that limit it are common to neighbouring patches.
   std::vector<Eigen::Matrix2f> covariances_px;
-  // By the tracker: the scene point that each one shows, ascending.
+  // Ids of the tracked scene points, ascending; set by the tracker.
   std::vector<TrackId> tracks;
-  // By the tracker: standard deviation of errors that neighbouring keypoints share, such as what is
-  // not known of the motion that a rolling shutter sees.
+  // Standard deviation of errors that neighbouring keypoints share, set by the tracker: what is
+  // unknown of the motion during the readout of a rolling shutter.
   double shared_error_px = 0.0;
-  // By DescribeFeatures.
+  // Set by DescribeFeatures.
   std::vector<float> angles_rad;  // direction of the intensity centroid
   cv::Mat descriptors;            // n x 32 bytes, ORB
 
@@ -80,32 +79,32 @@ struct Features {
 /// 8-bit grey version of a decoded image (8-bit, one or three channels).
 cv::Mat ToGrey(const cv::Mat& image);
 
-/// All options.num_levels levels, each by bilinear interpolation from the one before, none with a
-/// side below one pixel.
+/// Builds options.num_levels levels, each by bilinear interpolation from the one before; no side is
+/// below one pixel.
 /// @param grey  8-bit, one channel; must not change while the pyramid is in use.
 ImagePyramid BuildPyramid(const cv::Mat& grey, const FeatureOptions& options);
 
-/// Adds corners where `features` has none, up to options.max_features in all, spread evenly.
+/// Detects corners where `features` has none, up to options.max_features in all, evenly spread.
 /// @param num_threads  works on levels side by side; the result does not depend on it.
-/// @param features     n features carried over from elsewhere (keypoints_px, bearings, levels and
-///                     rgb of one length), or none. They keep their places; new ones come behind
-///                     them, ordered by level, row and column, at whole pixels of their level, with
-///                     the grey value as colour. Neither angles nor descriptors are touched.
-/// A corner whose bearing the camera model does not have is left out. Each part of a level has a
-/// share; carried features count towards it.
-/// Source:  Rublee et al., ORB, ICCV 2011; ours chooses among the FAST corners of a level by turns
-/// over a grid, strongest first, so that each part of the image gets its share.
+/// @param features  n features carried over from earlier frames (keypoints_px, bearings, levels and
+///                  rgb of equal length), or none. They keep their positions in the lists; new ones
+///                  are appended, ordered by level, row and column, at whole pixels of their level,
+///                  with the grey value as colour. Angles and descriptors are not changed.
+/// Corners for which the camera model has no bearing are left out. Each part of a level has a share
+/// of the features, and carried features count towards it.
+/// Source:  Rublee et al., ORB, ICCV 2011. Ours selects the FAST corners of a level in rounds over
+///          a grid, strongest first, so that each part of the image gets its share.
 void DetectFeatures(const ImagePyramid& pyramid,
                     const Camera& camera,
                     const FeatureOptions& options,
                     int num_threads,
                     Features& features);
 
-/// Angles and ORB descriptors of the features from index `first` on; those before it keep theirs,
-/// which they must have. Positions are rounded to pixels of their level.
+/// Computes angles and ORB descriptors of the features from index `first` on; earlier features must
+/// have theirs. Positions are rounded to pixels of their level.
 /// @param num_threads  works on levels side by side; the result does not depend on it.
-/// Source:  Rublee et al., ORB, ICCV 2011, with the pairs of points of cv::ORB. Ours reads its own
-/// levels at the corner itself; where the patch leaves the image, the image is mirrored.
+/// Source:  Rublee et al., ORB, ICCV 2011, with the point pairs of cv::ORB. Ours samples its own
+///          pyramid at the corner; where the patch leaves the image, the image is mirrored.
 void DescribeFeatures(const ImagePyramid& pyramid,
                       int num_threads,
                       Features& features,
@@ -115,7 +114,7 @@ void DescribeFeatures(const ImagePyramid& pyramid,
 /// @param image  8-bit, one or three channels (BGR).
 void ColourFeatures(const cv::Mat& image, Features& features, int first = 0);
 
-/// Pyramid, detection, description and colours of one frame by itself.
+/// Pyramid, detection, description and colours of a single frame.
 /// @param image  8-bit, one or three channels (BGR).
 /// @return  at most options.max_features features, ordered by level, row and column; none for an
 /// image without corners.

@@ -15,7 +15,7 @@
 namespace rotslam {
 namespace {
 
-constexpr int kPairs = 256;
+constexpr int kPairs = 256;  // comparisons of pixels, one bit each
 
 // The disc's rows as weights of the 32 pixels that start kOrbHalfPatch left of the centre: 1
 // inside, 0 outside. Symmetric about the diagonal, as in ORB.
@@ -57,7 +57,7 @@ PatternLists MakePatternLists() {
   return lists;
 }
 
-// Both moments of the disc; no sum leaves 16 bits until the last.
+// Both moments of the disc. All sums but the last fit into 16 bits.
 ROTSLAM_ALWAYS_INLINE void DiscMoments(
     const std::uint8_t* center, std::ptrdiff_t step, const DiscMask& mask, int& m_x, int& m_y) {
   std::array<std::int16_t, 32> sum;          // of each column
@@ -68,7 +68,7 @@ ROTSLAM_ALWAYS_INLINE void DiscMoments(
     const std::uint8_t* above = row - v * step;
     const std::uint8_t* below = row + v * step;
     const std::int16_t* weights = mask[v].data();
-    const std::int16_t arm = static_cast<std::int16_t>(v);
+    const std::int16_t distance = static_cast<std::int16_t>(v);
     for (int k = 0; k < 32; ++k) {
       const std::int16_t weight = weights[k];
       const std::int16_t both = static_cast<std::int16_t>(below[k] + above[k]);
@@ -76,7 +76,7 @@ ROTSLAM_ALWAYS_INLINE void DiscMoments(
       sum[k] = static_cast<std::int16_t>(sum[k] + static_cast<std::int16_t>(weight * both));
       moment[k] = static_cast<std::int16_t>(
           moment[k] +
-          static_cast<std::int16_t>(static_cast<std::int16_t>(weight * arm) * difference));
+          static_cast<std::int16_t>(static_cast<std::int16_t>(weight * distance) * difference));
     }
   }
   m_x = 0;
@@ -97,7 +97,7 @@ ROTSLAM_TARGET_AVX2 void DiscMomentsAvx2(
   DiscMoments(center, step, mask, m_x, m_y);
 }
 
-// To the nearest whole number, halves to the even one, by the carry out of the fraction.
+// Rounds to the nearest integer, halves to even, by adding 1.5 * 2^23, which drops the fraction.
 ROTSLAM_ALWAYS_INLINE int RoundSmall(float value) {
   constexpr float kShift = 12582912.0F;  // 1.5 * 2^23
   return std::bit_cast<int>(value + kShift) - std::bit_cast<int>(kShift);
@@ -122,9 +122,9 @@ ROTSLAM_TARGET_AVX2 void TurnPatternAvx2(
   TurnPattern(pattern, cosine, sine, step, offsets);
 }
 
-// The kernel in 256ths is 18 34 48 56 48 34 18. Sums of a column of it fit into 16 bits and those
-// of all of it into 24, so that nothing is rounded before the end. First all columns, then all
-// rows: what was stored a moment ago is slow to load again at another place.
+// The kernel in units of 1/256 is 18 34 48 56 48 34 18. Column sums fit into 16 bits and sums of
+// all pixels into 24, so that only the last step rounds. All columns are processed before all rows,
+// because loading values that were just stored at another alignment is slow.
 using BlurColumns = std::array<std::array<std::uint16_t, kBlurBlock + kBlurMargin>, kBlurBlock>;
 
 void BlurBlockPlain(const std::uint8_t* from,
@@ -157,7 +157,7 @@ ROTSLAM_TARGET_AVX2 inline __m256i Load256(const void* from) {
   return _mm256_loadu_si256(static_cast<const __m256i*>(from));
 }
 
-// One row of sums of columns, less 2^15 so that they are signed.
+// One row of column sums, less 2^15 so that they fit a signed number.
 ROTSLAM_TARGET_AVX2 inline void BlurColumnsAvx2(const std::uint8_t* from,
                                                 std::ptrdiff_t step,
                                                 std::uint16_t* column) {

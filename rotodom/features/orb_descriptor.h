@@ -5,12 +5,12 @@
 
 namespace rotslam {
 
-// Half the side of the patch that ORB looks at.
+// Half the side of ORB's patch, pixels.
 inline constexpr int kOrbHalfPatch = 15;
 
 inline constexpr float kOrbRadPerDeg = 0.017453292519943295F;
 
-// Farthest pixel, in a row or a column, that a turned pair of points can touch.
+// Largest row or column offset of a rotated point pair, pixels.
 inline constexpr int kOrbReach = 19;
 
 /// Direction from a pixel to the centroid of the grey values in the disc around it.
@@ -30,13 +30,14 @@ void ComputeOrbDescriptor(const std::uint8_t* blurred_center,
 
 // Side of a block that is blurred at once.
 inline constexpr int kBlurBlock = 32;
-// What the kernel needs on each side of it, and the columns that are read beside it in all.
+// Rows and columns that the kernel needs on each side of the block, and columns read beside it in
+// all.
 inline constexpr int kBlurReach = 3;
 inline constexpr int kBlurMargin = 8;
 
-/// The Gaussian of 7 x 7 pixels and sigma 2 that ORB puts before its comparisons, kBlurBlock pixels
-/// square; the bytes of cv::GaussianBlur. (cv::ORB blurs in floating point, to the same within one
-/// grey level: a descriptor in three has one of its 256 bits changed by it.)
+/// Blurs a square block of kBlurBlock pixels with the Gaussian of 7 x 7 pixels and sigma 2 that ORB
+/// applies before its comparisons. The result equals that of cv::GaussianBlur on bytes; cv::ORB
+/// blurs in floating point, which differs by one grey level at most.
 /// @param from  top left pixel of the block. kBlurReach rows above and below it, as many columns
 ///              before it and the rest of kBlurMargin after it are read.
 void BlurBlock(const std::uint8_t* from,

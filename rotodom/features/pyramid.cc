@@ -14,11 +14,11 @@
 namespace rotslam {
 namespace {
 
-// Rows are blended to 7 binary digits after the point, columns with weights of 14.
+// Row blending keeps 7 fractional bits; column weights have 14.
 constexpr int kRowDigits = 7;
 constexpr int kWeightDigits = 14;
 constexpr int kOne = 1 << kWeightDigits;
-// Output pixels made at once, from as many blended input pixels.
+// Output pixels computed together, and the blended input pixels loaded for them.
 constexpr std::size_t kGroup = 4;
 constexpr int kLoaded = 8;
 

@@ -9,31 +9,31 @@
 
 namespace rotslam {
 
-/// What is kept of a frame while others look for its points.
+/// A frame whose points are tracked in later frames.
 struct View {
   Features features;
   ImagePyramid pyramid;
   double timestamp_s = 0.0;
-  // Per feature: the motion of its keypoint that the camera's rotation does not explain.
+  // Per feature: image motion that the camera's rotation does not explain.
   std::vector<Eigen::Vector2d> flow_px_per_s;
-  // Per feature: refuted by its frame's edges, followed no longer.
+  // Per feature: an outlier of its frame's edges, no longer tracked.
   std::vector<bool> is_lost;
 };
 
-/// A view and where it looked.
+/// A view and its orientation.
 struct OrientedView {
   const View* view = nullptr;
   Rotation cam_from_world;
 };
 
-/// Number of points that both frames show; both lists ascend.
+/// Number of points that both frames see; both lists are ascending.
 int CountCommonTracks(const std::vector<TrackId>& a, const std::vector<TrackId>& b);
-/// The same of their `tracks`.
+/// The same for the `tracks` of two frames.
 int CountCommonTracks(const Features& a, const Features& b);
 
-/// Position in `features` of `track`, -1 when the frame does not show it.
+/// Index of `track` in `features`, -1 when the frame does not see it.
 int FindTrack(const Features& features, TrackId track);
-/// The same of a list that ascends.
+/// The same in an ascending list.
 int FindTrack(const std::vector<TrackId>& tracks, TrackId track);
 
 }  // namespace rotslam

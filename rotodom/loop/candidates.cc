@@ -30,7 +30,7 @@ std::vector<LoopCandidate> CandidateFinder::AddPlace(FrameId frame,
                                                      const BagOfWords& bag,
                                                      const std::vector<FrameId>& neighbours) {
   const std::set<FrameId> covisible(neighbours.begin(), neighbours.end());
-  // What a neighbour is alike is what a place must be alike at least.
+  // A candidate must be at least as similar as the least similar neighbour.
   double least_score = 1.0;
   std::size_t num_neighbours_found = 0;
   std::vector<PlaceMatch> matches;

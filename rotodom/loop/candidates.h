@@ -35,17 +35,16 @@ struct CandidateOptions {
   }
 };
 
-/// An older place that looks like the present one.
+/// An older place that is similar to the present one.
 struct LoopCandidate {
   FrameId frame;
   double score = 0.0;        // Score() of the two bags
-  double group_score = 0.0;  // its neighbours' added
-  // Places in a row that have led to the same group, this one included.
+  double group_score = 0.0;  // sum with the scores of its neighbours
+  // Number of successive places that led to the same group, including this one.
   int num_consistent = 0;
 };
 
-/// Remembers what places look like and which of them see the same scene, and finds the ones that
-/// look like a new one.
+/// Stores places and their neighbours, and finds those that are similar to a new one.
 /// Memory: PlaceDatabase's.
 /// Source:  Mur-Artal & Tardos, Fast Relocalisation and Loop Closing in Keyframe-Based SLAM, ICRA
 /// 2014: score relative to the neighbours', groups of covisible places, temporal consistency.
@@ -54,20 +53,20 @@ class CandidateFinder {
   /// Throws std::invalid_argument when an option is out of range.
   CandidateFinder(int num_words, const CandidateOptions& options);
 
-  /// Adds a place and finds those that look like it, best group first.
-  /// @param neighbours  older places that see part of the same scene, those that share most first.
+  /// Adds a place and finds similar ones, best group first.
+  /// @param neighbours  older places with common points, those with most first.
   std::vector<LoopCandidate> AddPlace(FrameId frame,
                                       const BagOfWords& bag,
                                       const std::vector<FrameId>& neighbours);
 
-  /// From now on the two count as seeing the same scene.
+  /// Makes the two places neighbours.
   void Join(FrameId a, FrameId b);
 
-  /// Those that share most first, places joined later behind them.
+  /// Neighbours in the order of AddPlace, followed by those of Join().
   const std::vector<FrameId>& NeighboursOf(FrameId place) const;
 
  private:
-  // Places that see one scene, and how many places in a row have led to some of them.
+  // Neighbouring places, and the number of successive places that led to some of them.
   struct Group {
     std::set<FrameId> places;
     int num_consistent = 0;

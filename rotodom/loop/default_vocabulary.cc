@@ -4,8 +4,8 @@
 
 #include "rotodom/loop/vocabulary_file.h"
 
-// The assembler copies the file into the object: a string literal of megabytes takes a compiler
-// minutes, and a path to a file would have to be right on every machine.
+// The assembler copies the file into the object. Compiling a string literal of megabytes takes
+// minutes, and a path to a file would not be valid on other machines.
 asm(".pushsection .rodata\n"
     ".balign 16\n"
     ".global rotslam_default_vocabulary_begin\n"

@@ -4,9 +4,9 @@
 
 namespace rotslam {
 
-/// The vocabulary that ships with the library, within it; config/vocabulary/README.md says what it
-/// was trained on.
-/// Cost:    4 ms; the caller keeps it.
+/// The vocabulary that is part of the library; config/vocabulary/README.md says what it was trained
+/// on.
+/// Cost:    4 ms per call; keep the result.
 Vocabulary DefaultVocabulary();
 
 }  // namespace rotslam

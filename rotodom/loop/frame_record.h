@@ -10,8 +10,8 @@ namespace rotslam {
 
 template <class Archive>
 void TransferValue(Archive& archive, LoopCheck& check) {
-  auto& [frame, match, score, num_inliers, angle_deg, way, accepted, num_edges] = check;
-  auto& [turn_scale, scaled_angle_deg] = way;
+  auto& [frame, match, score, num_inliers, angle_deg, scaled, accepted, num_edges] = check;
+  auto& [turn_scale, scaled_angle_deg] = scaled;
   archive(frame,
           match,
           score,
@@ -25,8 +25,8 @@ void TransferValue(Archive& archive, LoopCheck& check) {
 
 template <class Archive>
 void TransferValue(Archive& archive, LoopReport& report) {
-  auto& [checks, connections, waiting, matches] = report;
-  archive(checks, connections, waiting, matches);
+  auto& [checks, connections, unconfirmed, matches] = report;
+  archive(checks, connections, unconfirmed, matches);
 }
 
 template <class Archive>
@@ -41,11 +41,11 @@ void TransferValue(Archive& archive, ReadoutEstimate& readout) {
   archive(readout_s, readout_from, sigma_s, gain_sigmas, shear_px, noise_px, frame_s);
 }
 
-/// One frame as AddFrame found it: to take it again without its image.
+/// The result of AddFrame for one frame, from which the frame can be replayed without its image.
 struct FrameRecord {
-  FrameEstimate estimate;           // as the odometry says it, in its own world
-  std::optional<Features> corners;  // described, where the frame is to be a place
-  LoopReport loops;                 // what became of the frame before
+  FrameEstimate estimate;           // of the odometry, in its own world
+  std::optional<Features> corners;  // described; set where the frame becomes a place
+  LoopReport loops;                 // of the frame before
 
   template <class Archive>
   void Transfer(Archive& archive) {

@@ -15,7 +15,7 @@
 namespace rotslam {
 namespace {
 
-// By point: the nearest of `others`, -1 when none lies within a pixel and a half.
+// By point: index of the nearest of `others`, -1 when none is within 1.5 px.
 std::vector<int> FindNearest(const std::vector<Eigen::Vector2d>& points_px,
                              const std::vector<Eigen::Vector2d>& others_px) {
   constexpr double kReachPx = 1.5;
@@ -42,7 +42,7 @@ std::vector<int> FindNearest(const std::vector<Eigen::Vector2d>& points_px,
   return nearest;
 }
 
-// Matches of corners, as matches of the features at the same spots.
+// Converts matches of corners to matches of the features at the same positions.
 std::vector<std::array<int, 2>> MatchesOfFeatures(const std::vector<std::array<int, 2>>& corners,
                                                   const std::vector<int>& features_i,
                                                   const std::vector<int>& features_j) {
@@ -93,7 +93,7 @@ LoopClosure::LoopClosure(const Camera& camera,
       tools_{odometry.matching, odometry.relative_rotation, seed, num_threads},
       vocabulary_(std::move(vocabulary)),
       finder_(vocabulary_->num_words(), options.candidates),
-      waiting_(options.verification) {}
+      unconfirmed_(options.verification) {}
 
 LoopReport LoopClosure::AddFrame(const FrameEstimate& estimate,
                                  const cv::Mat& image,
@@ -149,10 +149,10 @@ LoopReport LoopClosure::VerifyBest(const Place& place,
     LoopEvidence evidence = Verify(place, candidates[k], cam_from_world, pieces);
     if (!evidence.accepted && !evidence.connections.empty() &&
         pieces_differ(evidence.connections.front().edge)) {
-      EdgeWithMatches doubtful = std::move(evidence.connections.front());
-      evidence.connections = waiting_.Confirmed(doubtful, cam_from_world, pieces);
+      EdgeWithMatches best = std::move(evidence.connections.front());
+      evidence.connections = unconfirmed_.Confirmed(best, cam_from_world, pieces);
       evidence.accepted = !evidence.connections.empty();
-      if (!evidence.accepted) report.waiting.push_back(std::move(doubtful));
+      if (!evidence.accepted) report.unconfirmed.push_back(std::move(best));
     }
     if (evidence.accepted) {
       report.connections = std::move(evidence.connections);
@@ -165,7 +165,7 @@ LoopReport LoopClosure::VerifyBest(const Place& place,
                              candidates[k].score,
                              evidence.num_inliers,
                              evidence.angle_deg,
-                             evidence.way,
+                             evidence.scaled,
                              evidence.accepted,
                              static_cast<int>(report.connections.size())});
   }
@@ -178,8 +178,8 @@ void LoopClosure::UpdateKeyframes(Place place, const LoopReport& report) {
     finder_.Join(connection.edge.i, connection.edge.j);
   }
   for (const EdgeMatches& matches : report.matches) finder_.Join(matches.frame_i, matches.frame_j);
-  waiting_.Remove(report.connections);
-  for (const EdgeWithMatches& connection : report.waiting) waiting_.Add(connection);
+  unconfirmed_.Remove(report.connections);
+  for (const EdgeWithMatches& connection : report.unconfirmed) unconfirmed_.Add(connection);
   places_.emplace(frame, std::move(place));
 }
 
@@ -220,7 +220,7 @@ bool LoopClosure::CorrectRollingShutter(const RotationMap& cam_from_world,
   if (here == cam_from_world.begin() || std::next(here) == cam_from_world.end()) return false;
   const auto time_s = [&](FrameId frame) { return timestamps_s_.at(frame); };
   const auto [motion, error_rad] =
-      BelievedMotionAt(corners.frame, cam_from_world, time_s, camera_.readout_s);
+      EstimateMotionAt(corners.frame, cam_from_world, time_s, camera_.readout_s);
   if (error_rad * kDegFromRad > options_.max_shutter_error_deg) return false;
   MoveToMidFrame(camera_, motion, corners);
   return true;
@@ -230,7 +230,7 @@ std::vector<FrameId> LoopClosure::NeighboursOf(const Place& place) const {
   std::vector<std::pair<int, FrameId>> common;
   for (auto older = places_.rbegin(); older != places_.rend(); ++older) {
     const int count = CountCommonTracks(older->second.tracks, place.tracks);
-    // Tracks do not come back: older places have no more of them.
+    // A lost track does not reappear, so older places have fewer common tracks.
     if (count < options_.min_common_points) break;
     common.emplace_back(count, older->first);
   }

@@ -10,9 +10,9 @@
 #include <opencv2/core.hpp>
 
 #include "rotodom/loop/candidates.h"
+#include "rotodom/loop/unconfirmed_edges.h"
 #include "rotodom/loop/verification.h"
 #include "rotodom/loop/vocabulary.h"
-#include "rotodom/loop/waiting_edges.h"
 #include "rotodom/odometry.h"
 #include "rotodom/types/disjoint_sets.h"
 
@@ -61,40 +61,39 @@ struct LoopOptions {
   }
 };
 
-/// A place that looked like an older one, and what geometry said.
+/// A loop candidate and its verification.
 struct LoopCheck {
   FrameId frame;
   FrameId match;
   double score = 0.0;
   int num_inliers = 0;
-  // Of the rotation around the loop: measured edge against the orientations before it.
+  // Rotation around the loop: angle between the measured edge and the orientations before it.
   double angle_deg = 0.0;
-  WayAround way;
+  ScaledLoop scaled;
   bool accepted = false;
-  int num_edges = 0;  // that it has brought; none where nobody knows how the views are turned
+  int num_edges = 0;  // added to the graph; 0 where the relative rotation is not reliable
 };
 
-/// What became of one frame.
+/// The result of loop closure for one frame.
 struct LoopReport {
   std::vector<LoopCheck> checks;
-  // Accepted ones, the most certain one first: from older places to it, or to an older one that
-  // its own confirm.
+  // Accepted edges, the most certain one first: from older places to the frame, or earlier edges
+  // that these confirm.
   std::vector<EdgeWithMatches> connections;
-  std::vector<EdgeWithMatches> waiting;  // from older places to it, for others to confirm
-  // With older places that are the same, but nobody knows how they are turned.
+  std::vector<EdgeWithMatches> unconfirmed;  // from older places to it, until others confirm them
+  // Matches with older places that are the same, but without a reliable relative rotation.
   std::vector<EdgeMatches> matches;
 };
 
-/// Where the time goes, seconds since the start.
+/// Time spent so far, s.
 struct LoopSeconds {
   double description = 0.0;
   double candidates = 0.0;  // words included
   double verification = 0.0;
 };
 
-/// Finds out when the camera is back: remembers frames that see something new as places, in visual
-/// words, looks for older places that look like a new one, and verifies them by matching and
-/// relative rotation.
+/// Detects loops: stores frames with new content as places in visual words, finds older places that
+/// are similar to a new one, and verifies them by matching and relative rotation.
 /// Memory: described corners of every place, 180 KB at 2,000 corners, and PlaceDatabase's.
 class LoopClosure {
  public:
@@ -106,68 +105,69 @@ class LoopClosure {
               std::uint64_t seed,
               int num_threads);
 
-  /// Takes what the odometry said of the next frame, and says what became of the frame before it:
-  /// only now is the rate of its rotation known, which a rolling shutter needs.
+  /// Adds the odometry's estimate of the next frame, and returns the result for the frame before
+  /// it: only now is its angular velocity known, which a rolling shutter needs.
   /// @param image           the frame's.
   /// @param cam_from_world  present orientations of all frames so far.
-  /// @param pieces          by frame: inside one, orientations are linked by edges.
+  /// @param pieces  connected components of the view-graph, by frame.
   LoopReport AddFrame(const FrameEstimate& estimate,
                       const cv::Mat& image,
                       const RotationMap& cam_from_world,
                       const DisjointSets& pieces);
 
-  /// After the last frame: what became of that.
+  /// Call after the last frame; returns its result.
   LoopReport Finish(const RotationMap& cam_from_world, const DisjointSets& pieces);
 
-  /// Described corners of the newest frame, if that is to be a place; else null.
+  /// Described corners of the newest frame, if it becomes a place; else null.
   const Features* NewestCorners() const { return pending_ ? &pending_->place.corners : nullptr; }
 
-  /// Takes a frame again from what AddFrame said, without the image and without looking for loops.
-  /// @param corners  what NewestCorners() was then.
-  /// @param report   of the frame before.
+  /// Replays a frame from the results of AddFrame, without the image and without searching for
+  /// loops.
+  /// @param corners  NewestCorners() at that time.
+  /// @param report  the result for the frame before.
   void Replay(const FrameEstimate& estimate,
               std::optional<Features> corners,
               const LoopReport& report,
               const RotationMap& cam_from_world);
 
-  /// Described corners of all places, which are forgotten.
+  /// Moves out the described corners of all places.
   std::map<FrameId, Features> TakePlaces();
 
   int num_places() const { return static_cast<int>(places_.size()); }
   const LoopSeconds& seconds() const { return seconds_; }
 
  private:
-  // A frame as it is remembered. Points that were followed here have descriptors of where they
-  // came from; corners found anew are found again when the camera comes back.
+  // A stored frame. Its corners are detected anew: tracked points have the descriptors of their
+  // first frame, while corners are detected again when the camera returns.
   struct Place {
     Features corners;             // described
-    std::vector<TrackId> tracks;  // that the frame shows
-    // By corner: the frame's feature there, -1 for none.
+    std::vector<TrackId> tracks;  // points that the frame sees
+    // By corner: index of the frame's feature at the same position, -1 for none.
     std::vector<int> features;
   };
-  // The newest one, as long as the rotation after it is not known.
+  // The newest place, until the rotation after it is known.
   struct PendingPlace {
     Place place;
-    std::vector<Eigen::Vector2d> features_px;  // the frame's
+    std::vector<Eigen::Vector2d> features_px;  // keypoints of the frame
   };
 
   bool IsNewPlace(const FrameEstimate& estimate) const;
   PendingPlace Describe(const FrameEstimate& estimate, const cv::Mat& image);
-  // The pending place, now that the rotation after it is known; nullopt where there is none or its
-  // corners are not known well enough.
+  // The pending place after the rotation that follows it is known; nullopt where there is none or
+  // its corners are not known accurately enough.
   std::optional<Place> TakePending(const RotationMap& cam_from_world);
   LoopReport VerifyBest(const Place& place,
                         const std::vector<LoopCandidate>& candidates,
                         const RotationMap& cam_from_world,
                         const DisjointSets& pieces);
   void UpdateKeyframes(Place place, const LoopReport& report);
-  // Moves the corners to where a global shutter would have seen them; false when that is not known
-  // well enough.
+  // Moves the corners to their positions in a global-shutter image; false where the motion is not
+  // known accurately enough.
   bool CorrectRollingShutter(const RotationMap& cam_from_world, Features& corners) const;
   std::vector<FrameId> NeighboursOf(const Place& place) const;
-  // From now on it is one itself.
+  // Finds places similar to this one and adds it to the places.
   std::vector<LoopCandidate> FindCandidates(const Place& place);
-  // What was compared with the candidate; its edges name the place's features.
+  // Verifies a candidate; the edges refer to the place's features.
   LoopEvidence Verify(const Place& place,
                       const LoopCandidate& candidate,
                       const RotationMap& cam_from_world,
@@ -179,7 +179,7 @@ class LoopClosure {
   VerificationTools tools_;
   std::shared_ptr<const Vocabulary> vocabulary_;
   CandidateFinder finder_;
-  WaitingEdges waiting_;
+  UnconfirmedEdges unconfirmed_;
   std::map<FrameId, Place> places_;
   std::optional<PendingPlace> pending_;
   std::map<FrameId, double> timestamps_s_;

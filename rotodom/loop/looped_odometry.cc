@@ -9,12 +9,12 @@
 namespace rotslam {
 namespace {
 
-// The search for loops asks for the features of places only.
-void DropWhatTracksNeed(FrameRecord& record) {
+// Loop closure needs the features of places only.
+void DropFeaturesOfTracks(FrameRecord& record) {
   if (!record.corners) record.estimate.features = {};
   record.estimate.revised_features.clear();
   for (auto* connections :
-       {&record.estimate.connections, &record.loops.connections, &record.loops.waiting}) {
+       {&record.estimate.connections, &record.loops.connections, &record.loops.unconfirmed}) {
     for (EdgeWithMatches& connection : *connections) connection.matches.pairs.clear();
   }
   for (EdgeMatches& matches : record.loops.matches) matches.pairs.clear();
@@ -33,7 +33,7 @@ LoopedOdometry::LoopedOdometry(const Camera& camera,
       window_(odometry.averaging.window),
       keep_features_(keep_features),
       orientations_(odometry.averaging, loops, keep_features, num_threads) {
-  // Chained orientations are what the odometry gives when nothing is averaged.
+  // Without averaging the orientations are those of the odometry, chained.
   if (!loops.use_loops || odometry.averaging.mode == "off") return;
   if (!vocabulary) vocabulary = std::make_shared<const Vocabulary>(DefaultVocabulary());
   closure_.emplace(camera, loops, odometry, std::move(vocabulary), seed, num_threads);
@@ -54,7 +54,7 @@ LoopedEstimate LoopedOdometry::AddFrame(FrameId frame,
       if (const Features* corners = closure_->NewestCorners()) record->corners = *corners;
     }
   }
-  if (record != nullptr && !keep_features_) DropWhatTracksNeed(*record);
+  if (record != nullptr && !keep_features_) DropFeaturesOfTracks(*record);
   return Take(std::move(estimate), std::move(loops));
 }
 
@@ -88,7 +88,7 @@ std::vector<LoopCheck> LoopedOdometry::Finish() {
   orientations_.AddLoop(std::move(loops.connections));
   orientations_.AddMatches(std::move(loops.matches));
   orientations_.Finish();
-  // Orientations still in the window have not been said to be settled.
+  // Covariances of the views that are still in the window are not final yet.
   int count = 0;
   for (auto entry = result().cam_from_world.rbegin();
        entry != result().cam_from_world.rend() && count < window_;

@@ -17,27 +17,27 @@
 
 namespace rotslam {
 
-/// What one frame brought, loops included.
+/// The result of one frame, including loops.
 struct LoopedEstimate {
   FrameId frame;
   Rotation cam_from_world;
-  // As in FrameEstimate: of the odometry, which loops can only make smaller.
+  // Covariance of the odometry, as in FrameEstimate; loops can only make it smaller.
   std::optional<Eigen::Matrix3d> covariance;
   FrameReport report;
-  SeenPoints points;             // of a replayed frame only where its record has features
-  std::vector<LoopCheck> loops;  // what the frame before looked like
-  bool has_averaged = false;     // orientations of older frames have moved as a loop says
+  SeenPoints points;             // of a replayed frame only if its record has features
+  std::vector<LoopCheck> loops;  // loop candidates of the frame before
+  bool has_averaged = false;     // a loop has changed orientations of older frames
 };
 
 struct FrameRecord;
 
-/// Rotational odometry that notices when the camera is back, and then spreads the drift over all
-/// orientations (LoopedOrientations). The odometry itself goes on undisturbed; its orientations are
-/// turned into the world that the last averaging left. What is remembered grows with the sequence.
+/// Rotational odometry with loop closure: loops distribute the drift over all orientations
+/// (LoopedOrientations). The odometry itself is not affected; its orientations are transformed into
+/// the world of the last averaging. Memory grows with the sequence.
 class LoopedOdometry {
  public:
   /// Throws std::invalid_argument when an option or the camera is out of range.
-  /// @param vocabulary     null for the one that comes with the project.
+  /// @param vocabulary  null: DefaultVocabulary.
   /// @param keep_features  for tracks.
   LoopedOdometry(const Camera& camera,
                  const OdometryOptions& odometry,
@@ -47,23 +47,23 @@ class LoopedOdometry {
                  std::uint64_t seed,
                  int num_threads);
 
-  /// Takes the next frame, as RotationalOdometry::AddFrame.
-  /// @param record  when given, receives what Replay needs.
+  /// Adds the next frame, as RotationalOdometry::AddFrame.
+  /// @param record  when set, receives the input of Replay.
   LoopedEstimate AddFrame(FrameId frame,
                           double timestamp_s,
                           const cv::Mat& image,
                           FrameRecord* record = nullptr);
 
-  /// To go on where another one stood that was made with the same arguments (but for the number of
-  /// threads) by the same program: takes all its frames, by their records, and then the state of
-  /// its odometry after the last of them, as RotationalOdometry::SaveState() and RestoreState().
-  /// What follows is the same to the last bit.
+  /// Restores the state of another object that was constructed with the same arguments (the number
+  /// of threads may differ) by the same program: replay all frames from their records, then restore
+  /// the state of the odometry after the last of them. Subsequent results are identical to the last
+  /// bit.
   LoopedEstimate Replay(FrameRecord record);
   std::string SaveState() { return odometry_.SaveState(); }
   void RestoreState(std::string_view state) { odometry_.RestoreState(state); }
 
-  /// To be called after the last frame: averages once more when there were loops, and completes
-  /// the covariances. What the last frame looked like.
+  /// Call after the last frame: averages once more when there were loops, and completes the
+  /// covariances. Returns the loop candidates of the last frame.
   std::vector<LoopCheck> Finish();
 
   /// All frames so far.

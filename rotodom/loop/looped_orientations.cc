@@ -79,12 +79,12 @@ void LoopedOrientations::AlignPieces(const RelativeRotation& loop) {
   const int piece_i = pieces_.Find(loop.i.value);
   const int piece_j = pieces_.Find(loop.j.value);
   if (piece_i == piece_j) return;
-  // What is being averaged has the piece where it was.
+  // A running averaging has the old orientations of the component.
   if (averaging_) EndAveraging();
   RotationMap& cam_from_world = result_.cam_from_world;
   const Rotation world_j_from_i =
       cam_from_world.at(loop.j).Inverse() * (loop.j_from_i * cam_from_world.at(loop.i));
-  // The world stays that of the first frame.
+  // The world remains that of the first frame.
   const int later_piece = std::max(piece_i, piece_j);
   const Rotation old_from_new_world =
       later_piece == piece_j ? world_j_from_i : world_j_from_i.Inverse();

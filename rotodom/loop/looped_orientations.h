@@ -12,13 +12,13 @@
 
 namespace rotslam {
 
-/// Orientations of all frames in one world, from an odometry that goes on in its own and from loops
-/// that spread its drift over all of them.
+/// Orientations of all frames in one world, from an odometry with a world of its own and from loops
+/// that distribute its drift.
 ///
-/// A loop that disagrees with the orientations has all of them averaged, on a thread of its own
-/// when there are several. LoopOptions::handover_frames frames later the result is taken over, and
-/// what came since is turned with the newest frame that it knows; who is early waits. So nothing
-/// depends on how fast anything runs.
+/// A loop that contradicts the orientations starts an averaging of all of them, on a thread of its
+/// own when there are several. The result is taken over LoopOptions::handover_frames frames later,
+/// and the frames since are rotated with the newest frame in it. If the averaging is not finished
+/// by then, the odometry waits. The results therefore do not depend on speed.
 class LoopedOrientations {
  public:
   LoopedOrientations(const AveragingOptions& averaging,
@@ -26,36 +26,35 @@ class LoopedOrientations {
                      bool keep_features,
                      int num_threads);
 
-  /// Turns the next frame's estimate from the odometry's world into the present one and takes its
-  /// orientation, which is all that the search for loops needs.
+  /// Transforms the next frame's estimate from the odometry's world into the present one and stores
+  /// its orientation, which the search for loops needs.
   void BeginFrame(FrameEstimate& estimate);
-  /// Takes the rest of it: edges, older orientations, features.
+  /// Stores the rest of the estimate: edges, older orientations, features.
   void AddFrame(FrameEstimate estimate);
 
-  /// Takes the edges of an accepted loop, the best one first, or none. Where no way was known
-  /// between their ends, the piece of the view-graph that began later is turned at once.
+  /// Adds the edges of an accepted loop, the best one first. Where the loop connects two components
+  /// of the view-graph, the one that began later is rotated at once.
   void AddLoop(std::vector<EdgeWithMatches> connections);
-  /// Takes matches that are known to be of the same points, and say nothing of orientations.
+  /// Adds matches of the same points without a reliable relative rotation.
   void AddMatches(std::vector<EdgeMatches> matches);
 
-  /// To be called once per frame, after its loops: begins and ends averaging.
-  /// @return  true when orientations have moved as a loop says.
-  /// Throws what the averaging threw.
+  /// Call once per frame, after its loops: starts and finishes averaging.
+  /// @return  true when a loop has changed orientations.
+  /// Throws exceptions of the averaging.
   bool EndFrame();
 
-  /// To be called after the last frame: averages once more when there were loops.
+  /// Call after the last frame: averages once more when there were loops.
   void Finish();
 
   void SetCovariance(FrameId frame, const Eigen::Matrix3d& covariance) {
     result_.covariance[frame] = covariance;
   }
 
-  /// Pieces of the view-graph, by frame: inside one orientations are linked by edges that more than
-  /// a handful of matches speak for.
+  /// Connected components of the view-graph over reliable edges, by frame.
   const DisjointSets& pieces() const { return pieces_; }
   const OdometryResult& result() const { return result_; }
   OdometryResult&& TakeResult() { return std::move(result_); }
-  /// Of the averaging itself, whoever waited for it.
+  /// Time of the averaging itself, s, whether or not the odometry waited.
   double averaging_seconds() const { return averaging_seconds_; }
 
  private:
@@ -69,10 +68,11 @@ class LoopedOrientations {
   };
 
   void AlignPieces(const RelativeRotation& loop);
-  // Turns the odometry's world; its window may from now on move frames after `settled` only.
+  // Changes the odometry's world. From now on its window may change frames after `settled` only.
   void TurnOdometry(const Rotation& old_from_new_world, FrameId settled);
   bool NeedsAveraging() const;
-  // Without the weak edges whose views are joined by better ones: chance may have made them.
+  // The edges without those of few matches between views that better edges connect, since such
+  // edges may be wrong by chance.
   std::vector<RelativeRotation> ReliableEdges() const;
   void BeginAveraging();
   void EndAveraging();
@@ -85,17 +85,17 @@ class LoopedOrientations {
 
   OdometryResult result_;
   DisjointSets pieces_;
-  std::set<std::pair<FrameId, FrameId>> weak_edges_;  // that a handful of matches speaks for
-  // Since the last averaging began: best edges of loops, and whether pieces were joined by one
-  // edge.
+  std::set<std::pair<FrameId, FrameId>> weak_edges_;  // edges with few matches
+  // Since the start of the last averaging: the best edges of loops, and whether components were
+  // connected by one edge.
   std::vector<RelativeRotation> open_loops_;
   bool has_aligned_ = false;
   bool has_loops_ = false;
   bool has_moved_ = false;  // since the last frame
   FrameId newest_;
-  // Turns the odometry's world into that of the result, once these are two.
+  // Rotation from the odometry's world to that of the result, once these differ.
   std::optional<Rotation> odometry_from_world_;
-  FrameId settled_;  // what loops say of frames up to here the odometry does not know
+  FrameId settled_;  // the odometry does not change frames up to this one
   std::optional<Averaging> averaging_;
   double averaging_seconds_ = 0.0;
 };

@@ -10,8 +10,8 @@ namespace {
 
 constexpr std::uint32_t kNoSlot = 0xFFFFFFFFU;
 
-// Weights are whole multiples of 2^-32: sums of them do not depend on their order, and one addition
-// to a frame's sum counts the word, above bit 40, and adds to the score, below it.
+// Weights are multiples of 2^-32, so that sums do not depend on their order. A single addition to a
+// frame's sum counts the word (bits above 40) and adds to the score (bits below).
 constexpr double kFixedOne = 4294967296.0;
 constexpr int kCountBit = 40;
 
@@ -66,7 +66,7 @@ void PlaceDatabase::Add(FrameId frame, const BagOfWords& bag) {
   slots_.emplace(frame, slot);
   for (const auto& [word, weight] : bag) {
     std::vector<Posting>& list = postings_[word];
-    // By a quarter: doubling would leave a third of the memory unused.
+    // Capacity grows by a quarter; doubling would leave a third of the memory unused.
     if (list.size() == list.capacity()) list.reserve(list.size() + list.size() / 4 + 2);
     list.push_back({slot, ToFixed(weight)});
   }
@@ -137,8 +137,8 @@ std::vector<PlaceMatch> PlaceDatabase::Query(
 }
 
 std::size_t PlaceDatabase::MemoryBytes() const {
-  // What the allocator adds to a block; a node of the map: its pair, the next node and its share
-  // of the buckets.
+  // Overhead of the allocator per block, and the size of a node of the map: pair, next pointer and
+  // share of the buckets.
   constexpr std::size_t kBlock = 16;
   constexpr std::size_t kMapNode = sizeof(std::pair<FrameId, std::uint32_t>) + 3 * sizeof(void*);
   std::size_t bytes = sizeof(*this) + postings_.capacity() * sizeof(std::vector<Posting>) +

@@ -11,7 +11,7 @@
 
 namespace rotslam {
 
-/// A frame that shares words with the one asked for.
+/// A frame that shares words with the queried one.
 struct PlaceMatch {
   FrameId frame;
   int common_words = 0;
@@ -19,12 +19,12 @@ struct PlaceMatch {
   bool operator==(const PlaceMatch&) const = default;
 };
 
-/// The matches with more than `ratio` times the most common words that any of them has, in the
-/// same order. ORB-SLAM2 looks at those above 0.8.
+/// Keeps the matches with more than `ratio` times the largest number of common words, in the same
+/// order. ORB-SLAM2 uses 0.8.
 /// @param ratio  0 to 1, else throws std::invalid_argument.
 std::vector<PlaceMatch> WithManyCommonWords(const std::vector<PlaceMatch>& matches, double ratio);
 
-/// Which frames show which words: finds the frames that look like a new one.
+/// Inverse index from words to frames: finds the frames that are similar to a new one.
 /// Memory:  8 bytes and growth for each word of each frame, and 24 bytes for each word of the
 ///          vocabulary: with the shipped one 21 MB for 1,000 frames of 2,000 features, to which
 ///          direct indices kept beside it add 5 MB (tests/bench/loop_bench.cc).
@@ -43,18 +43,18 @@ class PlaceDatabase {
   void Erase(FrameId frame);
 
   bool Contains(FrameId frame) const { return slots_.contains(frame); }
-  /// Frames held.
+  /// Number of frames.
   int size() const { return static_cast<int>(slots_.size()); }
 
   /// All frames that share words with the bag, but for those that `is_excluded` names, by
   /// ascending id.
-  /// @param is_excluded  asked once for each frame with a common word; may be empty.
+  /// @param is_excluded  called once for each frame with a common word; may be empty.
   /// Cost:    1.5 to 2.5 ns for each pair of a word of the bag and a frame that has it: 4 ms for
   ///          10,000 frames that share 150 words each (tests/bench/loop_bench.cc).
   std::vector<PlaceMatch> Query(const BagOfWords& bag,
                                 const std::function<bool(FrameId)>& is_excluded = {}) const;
 
-  /// What it holds, allocated but unused places included.
+  /// Allocated memory, including unused capacity.
   std::size_t MemoryBytes() const;
 
  private:

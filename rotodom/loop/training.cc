@@ -15,7 +15,7 @@
 namespace rotslam {
 namespace {
 
-// Numbers that are the same everywhere, which the standard library's distributions are not.
+// Random numbers that are equal on all platforms, unlike the standard library's distributions.
 // Source: Steele, Lea & Flood, Fast Splittable Pseudorandom Number Generators, OOPSLA 2014.
 class RandomNumbers {
  public:
@@ -35,7 +35,7 @@ class RandomNumbers {
   std::uint64_t state_;
 };
 
-// Ones in each of the 256 places, over many descriptors.
+// Counts the ones of each of the 256 bits over many descriptors.
 class BitCounter {
  public:
   void Add(const BinaryDescriptor& descriptor) {
@@ -59,7 +59,7 @@ class BitCounter {
   std::uint64_t count() const { return count_; }
 
  private:
-  // Bit k of the byte to byte k.
+  // Moves bit k of a byte to byte k.
   static std::uint64_t Spread(std::uint64_t byte) {
     const std::uint64_t copies = byte * 0x0101010101010101U;
     const std::uint64_t bits = copies & 0x8040201008040201U;
@@ -82,7 +82,7 @@ class BitCounter {
 
 using Members = std::vector<std::uint32_t>;
 
-// A node to be: the descriptors in [begin, end) of the members.
+// A future node: the descriptors [begin, end) of the members.
 struct Cluster {
   std::size_t begin = 0;
   std::size_t end = 0;
@@ -136,7 +136,7 @@ class Divider {
     }
   }
 
-  // To the nearest center, the first among equals; false when nothing changes.
+  // Assigns members to the nearest centre, the first among equals; false when nothing changes.
   bool Assign() {
     const bool is_first = parts_.empty();
     parts_.resize(members_.size());
@@ -290,8 +290,8 @@ Vocabulary TrainVocabulary(const std::vector<std::vector<BinaryDescriptor>>& des
         "TrainVocabulary: too few different descriptors to divide them into words");
   }
   const std::vector<int> counts = CountImages(Vocabulary(tree), descriptors_by_image, num_threads);
-  // Leaves in the order of their words, which here is that of their places. A word that after all
-  // came to none of the images' descriptors is as rare as one that one image has.
+  // Visits leaves in the order of their words, which is that of their positions. A word without a
+  // descriptor of the images counts as one of a single image.
   std::size_t word = 0;
   for (std::size_t place = 0; place < tree.num_children.size(); ++place) {
     if (tree.num_children[place] > 0) continue;

@@ -19,18 +19,18 @@ double LargestSigmaDeg(const Eigen::Matrix3d& covariance) {
   return std::sqrt(eigen.eigenvalues()[2]) * kDegFromRad;
 }
 
-// What one old place says of where the view looks.
-struct Opinion {
+// The edge from one old place to the view.
+struct PlaceEdge {
   EdgeWithMatches connection;
   Rotation old_from_world;
   Rotation view_from_world;
-  double sigma_deg = 0.0;                  // of the least certain axis
-  bool is_certain = false;                 // else it can but confirm others
-  std::optional<EdgeWithMatches> blurred;  // what it says of blurred corners
-  bool is_alike = false;                   // that is certain, too, and much the same
+  double sigma_deg = 0.0;                  // standard deviation of the least certain axis
+  bool is_certain = false;                 // false: the edge may confirm others only
+  std::optional<EdgeWithMatches> blurred;  // estimated with the covariances of blurred corners
+  bool is_alike = false;                   // `blurred` is certain and close to `connection`
 };
 
-// Keypoints of an old place and of the view that look alike.
+// Matched keypoints of an old place and of the view.
 using KeypointPairs = std::vector<std::array<int, 2>>;
 
 class Verifier {
@@ -42,12 +42,13 @@ class Verifier {
            const VerificationTools& tools)
       : view_(view), rates_(rates), camera_(camera), options_(options), tools_(tools) {}
 
-  // By the edge from an old place; nullopt where too few matches agree.
-  // @param asks_twice  whether it must say the same of blurred corners.
-  std::optional<Opinion> Ask(const Features& old_place,
-                             const Rotation& old_from_world,
-                             const Rotation& predicted_view_from_world,
-                             bool asks_twice) const {
+  // Estimates the edge from an old place; nullopt where too few matches agree.
+  // @param tests_blur  whether the edge is estimated a second time with the covariances of blurred
+  //                    corners.
+  std::optional<PlaceEdge> Estimate(const Features& old_place,
+                                    const Rotation& old_from_world,
+                                    const Rotation& predicted_view_from_world,
+                                    bool tests_blur) const {
     const Rotation predicted_view_from_old = predicted_view_from_world * old_from_world.Inverse();
     const Matches matches =
         MatchFeatures(old_place, view_, predicted_view_from_old, camera_, tools_.matching);
@@ -62,24 +63,25 @@ class Verifier {
     if (inliers < options_.min_inliers || inliers < least) return std::nullopt;
     const double seen_sigma_deg = LargestSigmaDeg(connection->edge.covariance);
     if (seen_sigma_deg > options_.max_witness_sigma_deg) return std::nullopt;
-    Opinion opinion;
-    opinion.is_certain = seen_sigma_deg <= options_.max_sigma_deg;
-    opinion.old_from_world = old_from_world;
-    opinion.view_from_world = connection->edge.j_from_i * old_from_world;
-    opinion.blurred = asks_twice && AreBlurred(old_place)
-                          ? AskedAgain(old_place, keypoints, predicted_view_from_old, *connection)
-                          : connection;
-    if (opinion.blurred) {
-      RelativeRotation& edge = opinion.blurred->edge;
+    PlaceEdge place_edge;
+    place_edge.is_certain = seen_sigma_deg <= options_.max_sigma_deg;
+    place_edge.old_from_world = old_from_world;
+    place_edge.view_from_world = connection->edge.j_from_i * old_from_world;
+    place_edge.blurred =
+        tests_blur && AreBlurred(old_place)
+            ? EstimateWithBlur(old_place, keypoints, predicted_view_from_old, *connection)
+            : connection;
+    if (place_edge.blurred) {
+      RelativeRotation& edge = place_edge.blurred->edge;
       const Rotation between = connection->edge.j_from_i * edge.j_from_i.Inverse();
-      opinion.is_alike = LargestSigmaDeg(edge.covariance) <= options_.max_sigma_deg &&
-                         between.AngleDeg() <= options_.max_cycle_deg;
+      place_edge.is_alike = LargestSigmaDeg(edge.covariance) <= options_.max_sigma_deg &&
+                            between.AngleDeg() <= options_.max_cycle_deg;
       AddShutterError(edge);
     }
     AddShutterError(connection->edge);
-    opinion.sigma_deg = LargestSigmaDeg(connection->edge.covariance);
-    opinion.connection = *std::move(connection);
-    return opinion;
+    place_edge.sigma_deg = LargestSigmaDeg(connection->edge.covariance);
+    place_edge.connection = *std::move(connection);
+    return place_edge;
   }
 
  private:
@@ -96,11 +98,12 @@ class Verifier {
                         noise);
   }
 
-  // The edge as blurred corners have it, if it is certain enough to confirm others.
-  std::optional<EdgeWithMatches> AskedAgain(const Features& old_place,
-                                            const KeypointPairs& keypoints,
-                                            const Rotation& predicted_view_from_old,
-                                            const EdgeWithMatches& connection) const {
+  // The edge estimated with the covariances of blurred corners, if it is certain enough to confirm
+  // others.
+  std::optional<EdgeWithMatches> EstimateWithBlur(const Features& old_place,
+                                                  const KeypointPairs& keypoints,
+                                                  const Rotation& predicted_view_from_old,
+                                                  const EdgeWithMatches& connection) const {
     const Rotation& view_from_old = connection.edge.j_from_i;
     std::optional<EdgeWithMatches> blurred =
         Connect(old_place,
@@ -120,7 +123,7 @@ class Verifier {
     edge.covariance += sigma * sigma * Eigen::Matrix3d::Identity();
   }
 
-  // Whether turns blur the corners of either image so that it would matter.
+  // Whether rotation blurs the corners of either image enough to matter.
   bool AreBlurred(const Features& old_place) const {
     constexpr double kLeastBlur = 0.3;  // an ellipse 1.04 times as long as wide
     const auto view_rate = rates_.find(view_.frame);
@@ -130,7 +133,7 @@ class Verifier {
     return options_.blur_s_per_px * camera_.MeanFocal() * rate > kLeastBlur;
   }
 
-  // Of each match, in units of a sharp corner's variance.
+  // Covariances of the matches, in units of the variance of a sharp corner.
   std::vector<MatchNoise> BlurredNoise(const Features& old_place,
                                        const KeypointPairs& keypoints,
                                        const Rotation& view_from_old) const {
@@ -160,42 +163,43 @@ class Verifier {
   const VerificationTools& tools_;
 };
 
-// Where the view looks, by blurred corners.
-Rotation ViewByBlurred(const Opinion& opinion) {
-  return opinion.blurred->edge.j_from_i * opinion.old_from_world;
+// Orientation of the view by the edge estimated with blurred corners.
+Rotation ViewByBlurred(const PlaceEdge& place_edge) {
+  return place_edge.blurred->edge.j_from_i * place_edge.old_from_world;
 }
 
-// What may be wrong with the rotation around a short cycle: this, or so many deviations of its
-// edges; turns are wrong by this share.
+// Largest rotation around a short cycle: `angle_deg`, or `sigmas` standard deviations of its edges
+// where that is more, plus `rotation_error` times the rotation between the old places.
 struct CycleBound {
   double angle_deg = 0.0;
   double sigmas = 0.0;
-  double turn_error = 0.0;
+  double rotation_error = 0.0;
 };
 
-// Whether the cycle view - one old place - another one - view closes.
-bool DoAgree(const Opinion& one, const Opinion& other, const CycleBound& bound) {
+// Whether the cycle of the view and two old places closes.
+bool DoAgree(const PlaceEdge& one, const PlaceEdge& other, const CycleBound& bound) {
   const Rotation around = other.view_from_world * one.view_from_world.Inverse();
   const Rotation other_from_one =
       other.connection.edge.j_from_i.Inverse() * one.connection.edge.j_from_i;
   const double angle_deg =
       std::max(bound.angle_deg, bound.sigmas * std::hypot(one.sigma_deg, other.sigma_deg));
-  return around.AngleDeg() <= angle_deg + bound.turn_error * other_from_one.AngleDeg();
+  return around.AngleDeg() <= angle_deg + bound.rotation_error * other_from_one.AngleDeg();
 }
 
-// The opinions that agree with a certain one, that being the one around which most matches do;
-// positions, in no order.
-std::vector<int> LargestAgreement(const std::vector<Opinion>& opinions, const CycleBound& bound) {
-  const auto inliers = [&](int index) { return opinions[index].connection.edge.num_inliers; };
-  const int count = static_cast<int>(opinions.size());
+// Indices of the edges that agree with one certain edge: the one with the most inliers in
+// agreement. The first index is that edge.
+std::vector<int> LargestAgreeingSet(const std::vector<PlaceEdge>& place_edges,
+                                    const CycleBound& bound) {
+  const auto inliers = [&](int index) { return place_edges[index].connection.edge.num_inliers; };
+  const int count = static_cast<int>(place_edges.size());
   std::vector<int> largest;
   int most_inliers = 0;
   for (int center = 0; center < count; ++center) {
-    if (!opinions[center].is_certain) continue;
+    if (!place_edges[center].is_certain) continue;
     std::vector<int> agreeing = {center};
     int num_inliers = inliers(center);
     for (int other = 0; other < count; ++other) {
-      if (other == center || !DoAgree(opinions[center], opinions[other], bound)) continue;
+      if (other == center || !DoAgree(place_edges[center], place_edges[other], bound)) continue;
       agreeing.push_back(other);
       num_inliers += inliers(other);
     }
@@ -206,18 +210,18 @@ std::vector<int> LargestAgreement(const std::vector<Opinion>& opinions, const Cy
   return largest;
 }
 
-// Whether an opinion's edge may go into the graph: what it says of blurred corners is what it says
-// of others, or what another one says of blurred corners.
-bool IsProven(const std::vector<Opinion>& opinions,
+// Whether an edge may enter the graph: estimated with blurred corners, it agrees with the first
+// estimate or with another place's edge estimated that way.
+bool IsProven(const std::vector<PlaceEdge>& place_edges,
               const std::vector<int>& agreeing,
               int index,
               double max_angle_deg) {
-  const Opinion& opinion = opinions[index];
-  if (!opinion.is_certain || !opinion.blurred) return false;
-  if (opinion.is_alike) return true;
+  const PlaceEdge& place_edge = place_edges[index];
+  if (!place_edge.is_certain || !place_edge.blurred) return false;
+  if (place_edge.is_alike) return true;
   return std::any_of(agreeing.begin(), agreeing.end(), [&](int other) {
-    if (other == index || !opinions[other].blurred) return false;
-    const Rotation around = ViewByBlurred(opinion) * ViewByBlurred(opinions[other]).Inverse();
+    if (other == index || !place_edges[other].blurred) return false;
+    const Rotation around = ViewByBlurred(place_edge) * ViewByBlurred(place_edges[other]).Inverse();
     return around.AngleDeg() <= max_angle_deg;
   });
 }
@@ -256,13 +260,14 @@ std::optional<std::string> VerificationOptions::Problem() const {
   return std::nullopt;
 }
 
-WayAround ScaleTurns(const RotationMap& cam_from_world,
-                     const RelativeRotation& loop,
-                     double max_turn_error) {
-  // Less turn in sum than this, radians, tells nothing of its scale.
+ScaledLoop ScaleRotations(const RotationMap& cam_from_world,
+                          const RelativeRotation& loop,
+                          double max_turn_error) {
+  // Smallest derivative of the rotation around the loop by the scale, rad, about half a turn: with
+  // less rotation the scale is not observable.
   constexpr double kLeastTurn = 3.0;
-  constexpr double kSmallStep = 1e-3;
-  constexpr int kRounds = 4;
+  constexpr double kSmallStep = 1e-3;  // of the scale, for the numerical derivative
+  constexpr int kRounds = 4;  // of Gauss-Newton; the rotation is nearly linear in the scale
   std::vector<Eigen::Vector3d> turns;
   const auto last = cam_from_world.find(loop.j);
   for (auto frame = cam_from_world.find(loop.i); frame != last; ++frame) {
@@ -293,7 +298,7 @@ LoopEvidence VerifyLoop(const Features& view,
                         const RotationMap& cam_from_world,
                         const RotationRates& rates,
                         int num_consistent,
-                        bool is_way_known,
+                        bool are_linked,
                         const Camera& camera,
                         const VerificationOptions& options,
                         const VerificationTools& tools) {
@@ -301,57 +306,63 @@ LoopEvidence VerifyLoop(const Features& view,
   const Rotation& present_view_from_world = cam_from_world.at(view.frame);
   LoopEvidence evidence;
   evidence.match = old_places.front()->frame;
-  std::vector<Opinion> opinions;
+  std::vector<PlaceEdge> place_edges;
   for (const Features* old_place : old_places) {
     const Rotation& old_from_world = cam_from_world.at(old_place->frame);
-    auto opinion = verifier.Ask(*old_place, old_from_world, present_view_from_world, is_way_known);
-    if (opinion) opinions.push_back(*std::move(opinion));
-    // Neighbours are witnesses; where the likeliest place says no, they are not asked.
-    if (opinions.empty()) return evidence;
+    auto place_edge =
+        verifier.Estimate(*old_place, old_from_world, present_view_from_world, are_linked);
+    if (place_edge) place_edges.push_back(*std::move(place_edge));
+    // Neighbours can only confirm the edge of the most similar place. Without that edge they are
+    // not matched.
+    if (place_edges.empty()) return evidence;
   }
-  const auto scale_turns = [&](const RelativeRotation& edge) {
-    return is_way_known ? ScaleTurns(cam_from_world, edge, options.max_turn_error) : WayAround();
+  const auto scale_rotations = [&](const RelativeRotation& edge) {
+    return are_linked ? ScaleRotations(cam_from_world, edge, options.max_turn_error) : ScaledLoop();
   };
-  const auto certain = std::find_if(
-      opinions.begin(), opinions.end(), [](const Opinion& opinion) { return opinion.is_certain; });
-  if (certain == opinions.end()) return evidence;
-  // The way to one place says how wrong turns are; that to the next one says the same.
-  const double turn_error = std::abs(scale_turns(certain->connection.edge).turn_scale - 1.0);
-  std::vector<int> agreeing =
-      LargestAgreement(opinions, {options.max_cycle_deg, options.max_cycle_sigmas, turn_error});
-  std::vector<bool> is_proven(opinions.size(), false);
+  const auto certain =
+      std::find_if(place_edges.begin(), place_edges.end(), [](const PlaceEdge& place_edge) {
+        return place_edge.is_certain;
+      });
+  if (certain == place_edges.end()) return evidence;
+  // The scale error of the rotations is that of the first certain edge; it is nearly the same for
+  // the next places.
+  const double rotation_error =
+      std::abs(scale_rotations(certain->connection.edge).turn_scale - 1.0);
+  std::vector<int> agreeing = LargestAgreeingSet(
+      place_edges, {options.max_cycle_deg, options.max_cycle_sigmas, rotation_error});
+  std::vector<bool> is_proven(place_edges.size(), false);
   for (const int index : agreeing) {
-    is_proven[index] = IsProven(opinions, agreeing, index, options.max_cycle_deg);
+    is_proven[index] = IsProven(place_edges, agreeing, index, options.max_cycle_deg);
   }
-  const auto doubt = [&](int index) {
-    const Opinion& opinion = opinions[index];
+  const auto rank = [&](int index) {
+    const PlaceEdge& place_edge = place_edges[index];
     return std::tuple(
-        !opinion.is_certain, !is_proven[index], opinion.connection.edge.covariance.trace());
+        !place_edge.is_certain, !is_proven[index], place_edge.connection.edge.covariance.trace());
   };
   std::stable_sort(
-      agreeing.begin(), agreeing.end(), [&](int a, int b) { return doubt(a) < doubt(b); });
-  const Opinion& best = opinions[agreeing.front()];
+      agreeing.begin(), agreeing.end(), [&](int a, int b) { return rank(a) < rank(b); });
+  const PlaceEdge& best = place_edges[agreeing.front()];
   const RelativeRotation& edge =
       (is_proven[agreeing.front()] ? *best.blurred : best.connection).edge;
   evidence.match = edge.i;
   evidence.num_inliers = edge.num_inliers;
   const Rotation view_from_world = edge.j_from_i * cam_from_world.at(edge.i);
   evidence.angle_deg = (view_from_world * present_view_from_world.Inverse()).AngleDeg();
-  evidence.way = scale_turns(edge);
+  evidence.scaled = scale_rotations(edge);
   const int num_frames = view.frame.value - evidence.match.value;
   const double drift_deg = options.max_drift_deg + options.max_drift_deg_per_sqrt_frame *
                                                        std::sqrt(static_cast<double>(num_frames));
   int num_inliers = 0;
-  for (const int index : agreeing) num_inliers += opinions[index].connection.edge.num_inliers;
+  for (const int index : agreeing) num_inliers += place_edges[index].connection.edge.num_inliers;
   evidence.accepted = static_cast<int>(agreeing.size()) >= options.min_edges &&
                       (num_inliers >= options.sure_inliers || num_consistent > 1) &&
-                      (!is_way_known || evidence.way.angle_deg <= drift_deg);
+                      (!are_linked || evidence.scaled.angle_deg <= drift_deg);
   for (const int index : agreeing) {
-    if (!opinions[index].is_certain) break;
+    if (!place_edges[index].is_certain) break;
     if (is_proven[index]) {
-      evidence.connections.push_back(*std::move(opinions[index].blurred));
+      evidence.connections.push_back(*std::move(place_edges[index].blurred));
     } else {
-      evidence.unproven.push_back(std::move(opinions[index].connection));
+      evidence.unproven.push_back(std::move(place_edges[index].connection));
     }
   }
   return evidence;

@@ -79,35 +79,35 @@ struct VerificationOptions {
   }
 };
 
-/// The way from one end of a loop to the other with all its turns scaled alike, so that it fits the
+/// A loop with all rotations between its ends scaled by the same factor, so that they fit the
 /// measured rotation best.
-struct WayAround {
-  double turn_scale = 1.0;  // one where the way has too little turn in sum to tell
-  double angle_deg = 0.0;   // what is left of the rotation around the loop
+struct ScaledLoop {
+  double turn_scale = 1.0;  // 1 where the sum of the rotations is too small to estimate it
+  double angle_deg = 0.0;   // remaining rotation around the loop
 };
 
-/// Finds that scale. On a way that turns right round it measures the focal length: a scale above
-/// one says that the true one is shorter.
+/// Estimates that scale. In a loop with a full turn it measures the focal length: a scale above one
+/// means that the true focal length is shorter.
 /// @param cam_from_world  orientations of both ends and of all frames between them.
-/// @param max_turn_error  the scale stays within one +- this.
-WayAround ScaleTurns(const RotationMap& cam_from_world,
-                     const RelativeRotation& loop,
-                     double max_turn_error);
+/// @param max_turn_error  largest difference of the scale from one.
+ScaledLoop ScaleRotations(const RotationMap& cam_from_world,
+                          const RelativeRotation& loop,
+                          double max_turn_error);
 
-/// How a present place was compared with an old one.
+/// The result of comparing a place with an older one.
 struct LoopEvidence {
-  // The old place that the most certain edge leads to; the candidate when there is none.
+  // The older place of the most certain edge; the candidate when there is none.
   FrameId match;
   int num_inliers = 0;  // of that edge
-  // Of the rotation around the loop: that edge against the present orientations.
+  // Rotation around the loop: angle between that edge and the present orientations.
   double angle_deg = 0.0;
-  WayAround way;
+  ScaledLoop scaled;
   bool accepted = false;
-  // The certain ones of the edges that agree with each other, the most certain one first, accepted
-  // or not.
+  // Edges that agree with each other and are certain, the most certain one first, whether or not
+  // the loop is accepted.
   std::vector<EdgeWithMatches> connections;
-  // Those that say something else of blurred corners: the same points, but how the view is turned
-  // against the old place they do not know.
+  // Edges whose rotation changes when motion blur is taken into account: they prove the same
+  // points, but no relative rotation.
   std::vector<EdgeWithMatches> unproven;
 };
 
@@ -118,22 +118,22 @@ struct VerificationTools {
   int num_threads = 1;
 };
 
-/// Decides by geometry whether `view` sees what `old_places` saw: matches their descriptors and
-/// estimates their relative rotations as the odometry does, and asks whether enough of them are
-/// consistent with one another and with what is known of the way between.
+/// Verifies a candidate geometrically: matches descriptors and estimates relative rotations as the
+/// odometry does, and tests whether enough of the edges are consistent with each other and with the
+/// orientations between the two places.
 /// @param view             described features of the present place.
 /// @param old_places       described features; the candidate first, then its neighbours, if any.
 /// @param cam_from_world   present orientations of all of them, and of the frames in between.
-/// @param rates            of the view and of old places, as far as they are known.
+/// @param rates  angular velocities of the view and of old places, where known.
 /// @param num_consistent   as in LoopCandidate.
-/// @param is_way_known     orientations of the two places are linked by edges, so that drift is all
-///                         that can be wrong with them.
+/// @param are_linked  the two places are in one component of the view-graph, so that their
+///                    orientations are wrong by drift only.
 LoopEvidence VerifyLoop(const Features& view,
                         std::span<const Features* const> old_places,
                         const RotationMap& cam_from_world,
                         const RotationRates& rates,
                         int num_consistent,
-                        bool is_way_known,
+                        bool are_linked,
                         const Camera& camera,
                         const VerificationOptions& options,
                         const VerificationTools& tools);

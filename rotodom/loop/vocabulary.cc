@@ -15,8 +15,8 @@ namespace {
 
 constexpr std::size_t kMaxDescriptors = std::numeric_limits<std::uint16_t>::max() + std::size_t{1};
 
-// Descriptors that walk side by side, so that the tree's nodes come from memory while others are
-// compared: twice as fast as one after the other.
+// Descriptors that descend the tree together, so that nodes are loaded while others are compared:
+// twice as fast as one after the other.
 constexpr std::size_t kBatch = 64;
 
 std::optional<std::string> ProblemOfShape(const VocabularyTree& tree) {
@@ -34,7 +34,7 @@ std::optional<std::string> ProblemOfShape(const VocabularyTree& tree) {
   return std::nullopt;
 }
 
-// The arrays are walked level by level: [begin, end) is one level, its children are the next.
+// Visits the arrays level by level: the children of level [begin, end) are the next level.
 std::optional<std::string> ProblemOfLevels(const VocabularyTree& tree) {
   const std::size_t count = tree.num_children.size();
   std::size_t begin = 0;
@@ -171,7 +171,7 @@ Vocabulary::Vocabulary(VocabularyTree tree) : tree_(std::move(tree)) {
   }
   const std::size_t count = tree_.num_children.size();
   nodes_.resize(count);
-  // Leaves get their words by id; `places` is the inverse of `ids`.
+  // Words are numbered by the ids of the leaves; `places` is the inverse of `ids`.
   std::vector<std::uint32_t> places(tree_.ids.size());
   for (std::size_t place = 0; place < places.size(); ++place) {
     places[tree_.ids[place]] = static_cast<std::uint32_t>(place);
@@ -191,8 +191,8 @@ Vocabulary::Vocabulary(VocabularyTree tree) : tree_(std::move(tree)) {
   word_weights_.shrink_to_fit();
 }
 
-// Distance and number of the child in one integer: its least value is the first of the nearest,
-// without a branch that nobody can predict.
+// Distance and number of a child in one integer: the minimum is the first of the nearest, without
+// unpredictable branches.
 std::uint32_t Vocabulary::NearestChild(const Node& node, const BinaryDescriptor& descriptor) const {
   const BinaryDescriptor* children = tree_.descriptors.data() + node.first_child;
   std::uint32_t nearest = ~std::uint32_t{0};

@@ -11,12 +11,12 @@
 
 namespace rotslam {
 
-/// What a word weighs in an image; the numbers are those of DBoW2's files.
+/// Weight of a word in an image; the numbers are those of DBoW2's files.
 enum class Weighting {
-  kTfIdf = 0,   // its weight, as often as the image shows it
-  kTf = 1,      // the same; the vocabulary's weights are one
-  kIdf = 2,     // its weight, once
-  kBinary = 3,  // the same; the vocabulary's weights are one
+  kTfIdf = 0,   // its weight times the number of its occurrences
+  kTf = 1,      // the same with weights of one
+  kIdf = 2,     // its weight
+  kBinary = 3,  // the same with weights of one
 };
 /// "TF_IDF", "TF", "IDF" or "BINARY".
 const char* Name(Weighting weighting);
@@ -32,19 +32,19 @@ struct WordWeight {
 /// without features.
 using BagOfWords = std::vector<WordWeight>;
 
-/// How alike two images are: 1 - |a - b|_1 / 2, 0 without a common word, 1 for equal bags.
+/// Similarity of two images: 1 - |a - b|_1 / 2, 0 without a common word, 1 for equal bags.
 /// Error:   1e-6, of the weights as float.
 /// Source:  Galvez-Lopez & Tardos, Bags of Binary Words, T-RO 2012, eq. (2); for weights that sum
 ///          to one it is the sum over common words of the lesser weight.
 double Score(const BagOfWords& a, const BagOfWords& b);
 
-/// Features of an image by the node that they come through, for matching two images node by node.
+/// Features of an image by the vocabulary node of their path, for matching two images node by node.
 struct DirectIndex {
   std::vector<std::uint32_t> nodes;     // m node ids, ascending
   std::vector<std::uint32_t> starts;    // m + 1 places in `features`; empty when m is 0
   std::vector<std::uint16_t> features;  // ascending within a node
 
-  /// Of nodes[k].
+  /// Features of nodes[k].
   std::span<const std::uint16_t> FeaturesOf(std::size_t k) const {
     return std::span(features).subspan(starts[k], starts[k + 1] - starts[k]);
   }
@@ -64,13 +64,13 @@ struct VocabularyTree {
   int depth = 6;       // levels below the root at most, 1 to 20 (DBoW2's L)
   Weighting weighting = Weighting::kTfIdf;
   std::vector<std::uint8_t> num_children;
-  std::vector<BinaryDescriptor> descriptors;  // the root's is not looked at
+  std::vector<BinaryDescriptor> descriptors;  // the root's is ignored
   std::vector<float> weights;                 // of the leaves; zero at other nodes
-  // Of each node, where it is known by another number than its place here: 0 to n - 1, below those
-  // of its children, which ascend. Empty: the place.
+  // Node ids, where they differ from the positions in these arrays: 0 to n - 1, below those of the
+  // children, which ascend. Empty: the positions.
   std::vector<std::uint32_t> ids;
 
-  /// What keeps this from being such a tree, in a few words; nullopt when all is well.
+  /// Reason why this is no such tree, in a few words; nullopt when it is one.
   std::optional<std::string> Problem() const;
 };
 
@@ -94,7 +94,7 @@ class Vocabulary {
   /// Cost:    0.7 ms for 2,000 descriptors at branching 10 and depth 5 (tests/bench/loop_bench.cc).
   ImageWords Transform(std::span<const BinaryDescriptor> descriptors, int levels_up) const;
 
-  /// The word that a descriptor comes to.
+  /// The word of a descriptor.
   std::uint32_t WordOf(const BinaryDescriptor& descriptor) const;
   float WeightOf(std::uint32_t word) const { return word_weights_[word]; }
 
@@ -107,7 +107,7 @@ class Vocabulary {
     std::uint32_t first_child = 0;  // its place; of a leaf, its word
   };
 
-  // Where a descriptor has come to, by places in the tree.
+  // Position of a descriptor in the tree.
   struct Step {
     std::uint32_t place = 0;
     std::uint32_t index_place = 0;  // on the level of the direct index

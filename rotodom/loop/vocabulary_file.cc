@@ -294,7 +294,7 @@ void Append(const Value* values, std::size_t count, std::string& bytes) {
   if (count > 0) bytes.append(reinterpret_cast<const char*>(values), count * sizeof(Value));
 }
 
-// The caller has checked that so many are there.
+// Copies `count` values; the caller has checked that they are there.
 template <class Value>
 void Take(std::string_view& bytes, Value* values, std::size_t count) {
   if (count == 0) return;  // `values` may be null then
@@ -333,7 +333,7 @@ BinaryHeader CheckedHeader(std::string_view bytes, const std::string& name) {
 
 constexpr std::uintmax_t kMaxFileBytes = std::uintmax_t{2} << 30;
 
-// What a file that is no vocabulary of ours may be, and what helps.
+// Message about a file of another format: what it seems to be, and what to do.
 std::string Foreign(std::string_view start) {
   constexpr std::string_view kExpected =
       "expected ORB-SLAM's text format (ORBvoc.txt) or one written by `rotslam vocabulary`";

@@ -30,10 +30,10 @@ std::string EncodeText(const Vocabulary& vocabulary);
 /// nodes' ids (4 bytes each) where they are not those places; a checksum (8 bytes). Little-endian.
 std::string EncodeBinary(const Vocabulary& vocabulary);
 
-/// The inverse of EncodeBinary; `name` stands for the file in messages.
+/// The inverse of EncodeBinary; messages refer to the file as `name`.
 Vocabulary DecodeBinary(std::span<const char> bytes, const std::string& name);
 
-/// What EncodeBinary puts behind the bytes. No protection against intent.
+/// Checksum at the end of EncodeBinary's result. It detects damage, not manipulation.
 std::uint64_t VocabularyChecksum(std::string_view bytes);
 
 }  // namespace rotslam

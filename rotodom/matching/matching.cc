@@ -14,7 +14,7 @@
 namespace rotslam {
 namespace {
 
-constexpr int kCellPx = 32;
+constexpr int kCellPx = 32;  // of the grid: near the search radius, so that few cells are visited
 
 // Keypoints of one frame by image cell.
 class KeypointGrid {
@@ -33,7 +33,7 @@ class KeypointGrid {
     }
   }
 
-  // All keypoints, in the order in which a search over the whole image comes by them.
+  // All keypoints, in the order of a search over the whole image.
   std::vector<int> All() const {
     std::vector<int> all;
     all.reserve(features_.size());
@@ -72,7 +72,7 @@ struct Candidate {
   int distance = std::numeric_limits<int>::max();
 };
 
-// The two nearest of those that one keypoint is compared with; of equals the first.
+// The two nearest candidates of one keypoint; the first of equal ones.
 struct Nearest {
   Candidate first;
   Candidate second;
@@ -87,7 +87,8 @@ struct Nearest {
   }
 };
 
-// The nearest of frame j, where it is near enough and has no alternative; else j = -1.
+// The nearest candidate of frame j if its distance is small enough and the second one is clearly
+// worse; else j = -1.
 Candidate Choose(const Nearest& nearest,
                  const Features& features_j,
                  const MatchingOptions& options) {
@@ -101,7 +102,7 @@ Candidate Choose(const Nearest& nearest,
   return first;
 }
 
-// Looks for each keypoint of frame i in frame j. What comes out has an entry for each of them.
+// Searches each keypoint of frame i in frame j. Results have one entry per keypoint.
 class Search {
  public:
   Search(const Features& features_i, const Features& features_j, const MatchingOptions& options)
@@ -112,7 +113,7 @@ class Search {
         descriptors_j_(ToBinaryDescriptors(features_j.descriptors)),
         grid_j_(features_j) {}
 
-  // Within a circle around where it should be, if that is known.
+  // Searches within a circle around the predicted position, if there is one.
   std::vector<Candidate> Around(const std::vector<std::optional<Eigen::Vector2d>>& predicted_px,
                                 double radius) const {
     std::vector<Candidate> best(features_i_.size());
@@ -128,8 +129,8 @@ class Search {
     return best;
   }
 
-  // In the whole image. What a keypoint can be compared with lies side by side, so that of each
-  // pair nothing is left to be found but the distance.
+  // Searches the whole image. Comparable descriptors are stored contiguously, so that only the
+  // distances remain to be computed.
   std::vector<Candidate> Anywhere() const {
     struct Group {
       std::vector<int> indices;
@@ -169,7 +170,7 @@ class Search {
   KeypointGrid grid_j_;
 };
 
-// Keeps, of all keypoints of frame i that chose the same one of frame j, the nearest.
+// Of all keypoints of frame i with the same match in frame j, keeps the nearest.
 void KeepMutual(std::vector<Candidate>& best, int num_j) {
   std::vector<int> owner(num_j, -1);
   for (int i = 0; i < static_cast<int>(best.size()); ++i) {
@@ -182,12 +183,12 @@ void KeepMutual(std::vector<Candidate>& best, int num_j) {
   }
 }
 
-// All patches turn by about the same angle between two frames: keeps the matches near the commonest
-// turn.
-void KeepCommonTurn(std::vector<Candidate>& best,
-                    const Features& features_i,
-                    const Features& features_j) {
-  constexpr int kBins = 24;
+// Patches rotate by about the same angle between two frames: keeps the matches near the most
+// frequent angle.
+void KeepCommonRotation(std::vector<Candidate>& best,
+                        const Features& features_i,
+                        const Features& features_j) {
+  constexpr int kBins = 24;  // of 15 deg: patch angles have errors of several degrees
   const auto bin_of = [&](int i) {
     const double turn = features_j.angles_rad[best[i].j] - features_i.angles_rad[i];
     const double fraction = turn / (2.0 * std::numbers::pi);
@@ -248,12 +249,12 @@ Matches MatchFeatures(const Features& features_i,
   for (const SearchRange range :
        {SearchRange::kGuided, SearchRange::kWide, SearchRange::kWholeImage}) {
     result.range = range;
-    // Where the prediction has failed, features that it sends out of the image count as well.
+    // In a search over the whole image, keypoints predicted outside of the image are included.
     best = range == SearchRange::kWholeImage ? search.Anywhere()
            : range == SearchRange::kWide     ? search.Around(predicted_px, options.wide_radius_px)
                                              : search.Around(predicted_px, options.radius_px);
     KeepMutual(best, features_j.size());
-    KeepCommonTurn(best, features_i, features_j);
+    KeepCommonRotation(best, features_i, features_j);
     const auto found =
         std::count_if(best.begin(), best.end(), [](const Candidate& c) { return c.j >= 0; });
     if (found >= options.min_matches) break;

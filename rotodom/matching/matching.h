@@ -56,12 +56,13 @@ struct Matches {
   SearchRange range = SearchRange::kGuided;  // how far the search had to go
 };
 
-/// Matches two frames' descriptors around the positions that the predicted rotation gives: the best
-/// candidate of each keypoint of frame i by ratio test; of several that chose the same keypoint of
-/// frame j, the nearest; of those, the ones whose patches turn as most do. Searches wider only
-/// where too few are found.
-/// Cost:    n_i times the number of features in the search circle; for 3,000 features each 3 ms
-/// where the prediction holds, 30 where the whole image has to be searched (matching_bench).
+/// Matches the descriptors of two frames near the positions that the predicted rotation gives. A
+/// match is the best candidate by the ratio test; of several keypoints of frame i with the same
+/// keypoint of frame j only the nearest is kept, and of these only matches whose patches rotate as
+/// most do. The search range grows only where too few matches are found.
+/// Cost:    n_i times the number of features in the search circle; for 3,000 features in each frame
+///          3 ms with a correct prediction, 30 ms for a search over the whole image
+///          (matching_bench).
 Matches MatchFeatures(const Features& features_i,
                       const Features& features_j,
                       const Rotation& predicted_j_from_i,

@@ -10,11 +10,13 @@ namespace {
 constexpr int kHalf = kPatchSide / 2;
 constexpr int kRow = 12;  // a patch row in whole registers
 constexpr int kNumPixels = kPatchSide * kPatchSide;
-constexpr int kMaxIterations = 12;
-constexpr float kMinStepPx = 0.01F;
-// Below this share of the larger one, the smaller eigenvalue of the Hessian is no structure.
+constexpr int kMaxIterations = 12;   // of Gauss-Newton
+constexpr float kMinStepPx = 0.01F;  // below the accuracy of an alignment, 0.02 px
+// Smallest ratio of the Hessian's eigenvalues; below it the patch has structure in one direction
+// only.
 constexpr float kMinStructure = 0.01F;
-// Mean squared gradient (grey levels per pixel) that a direction needs at least.
+// Smallest mean squared gradient in any direction, (grey levels per pixel)^2; below it noise
+// dominates.
 constexpr float kMinGradientEnergy = 1.0F;
 
 using Row = Eigen::Array<float, kRow, 1>;
@@ -30,7 +32,7 @@ Row InsidePatch() {
   return mask;
 }
 
-// The pixels that a patch centred near one place can touch, as floating point.
+// Copy of the pixels that a patch centred near one position can touch, as floating point.
 template <int Side>
 class Window {
  public:
@@ -41,7 +43,7 @@ class Window {
   bool Load(const cv::Mat& image, int x, int y) {
     if (x < 0 || y < 0 || x + kStride > image.cols || y + Side > image.rows) {
       if (x < 0 || y < 0 || x + Side > image.cols || y + Side > image.rows) return false;
-      // At the right border a whole register does not fit.
+      // At the right border a whole register would leave the image.
       for (int row = 0; row < Side; ++row) {
         const std::uint8_t* from = image.ptr<std::uint8_t>(y + row) + x;
         for (int column = 0; column < kStride; ++column) {
@@ -74,11 +76,11 @@ struct Bilinear {
   float w01;
   float w11;
 
-  // Share of the image noise's variance that is left in the interpolated values.
+  // Ratio of the noise variance of interpolated values to that of pixels.
   float NoiseLeft() const { return w00 * w00 + w10 * w10 + w01 * w01 + w11 * w11; }
 };
 
-// The same for values at all fractions of a pixel, on average.
+// Mean of that ratio over all fractions of a pixel.
 constexpr float kMeanNoiseLeft = 4.0F / 9.0F;
 
 float SampleAt(const cv::Mat& image, float x, float y) {
@@ -95,7 +97,7 @@ constexpr int kSampled = kPatchSide + 2;  // one more on each side, for the grad
 constexpr int kSampledStride = 16;
 using SampledPatch = std::array<float, static_cast<std::size_t>(kSampled) * kSampledStride>;
 
-// The share of the noise that is left; nullopt where the patch leaves the image.
+// Returns the noise ratio (Bilinear::NoiseLeft); nullopt where the patch leaves the image.
 std::optional<float> SampleShifted(const cv::Mat& image,
                                    const Eigen::Vector2f& center,
                                    SampledPatch& sampled) {
@@ -149,7 +151,7 @@ std::optional<PatchTemplate> PatchTemplate::Sample(const cv::Mat& image,
   static_assert(kStride == kRow);
   alignas(16) SampledPatch sampled = {};
   const Eigen::Vector2f center = center_px.cast<float>();
-  // Where the far corner of the patch moves by less than a tenth of a pixel the turn does not show.
+  // A warp that moves the corners of the patch by less than a tenth of a pixel is ignored.
   const bool shifted_only =
       (patch_from_view - Eigen::Matrix2d::Identity()).cwiseAbs().maxCoeff() * kHalf < 0.1;
   const std::optional<float> noise_left =
@@ -288,9 +290,9 @@ struct PatchAligner {
     PatchAlignment alignment;
     alignment.center_px = center.cast<double>();
     alignment.correlation = along / std::sqrt(variance * patch.energy_);
-    // The residual holds both images' noise, less what interpolation has taken from it; that part
-    // is the fastest, which moves the position least. Four parameters have been fitted. The gain
-    // turns the patch's gradients into the image's.
+    // The residual contains the noise of both images, less the part removed by interpolation, whose
+    // high frequencies hardly affect the position. Four parameters have been fitted. The gain
+    // converts the patch's gradients to the image's.
     const float gain = along / patch.energy_;
     const float residual = std::max(0.0F, variance - gain * along);
     alignment.covariance =
@@ -300,13 +302,13 @@ struct PatchAligner {
     return alignment;
   }
 
-  // How a patch's values change with a shift by one pixel in x and in y, a segment by one, and a
-  // shear by one along the flow that grows with x and with y.
+  // Derivatives of a patch's values by a shift of one pixel in x and y, a stretch along the flow,
+  // and shears along the flow that grow with x and y.
   static constexpr int kNumModes = 5;
   using ModeVector = Eigen::Matrix<float, kNumModes, 1>;
   using ModeMatrix = Eigen::Matrix<float, kNumModes, kNumModes>;
 
-  // Normal equations for how far the image has moved in each mode, with offset and gain taken out.
+  // Normal equations for the amount of each mode, with offset and gain eliminated.
   struct ModeEquations {
     ModeMatrix products;
     ModeVector b;
@@ -407,8 +409,8 @@ struct PatchAligner {
     const ModeMatrix inverse = information.inverse();
     const ModeVector motion = inverse * equations->b;
 
-    // A point d from the centre is bent by segment * (shear . d) / flow * d; the shift that fits
-    // best has the mean of that.
+    // The bend of a plane moves a point at offset d by stretch * (shear . d) / flow * d. The
+    // best-fitting shift contains the mean of that.
     constexpr float kSecondMoment = (kPatchSide * kPatchSide - 1) / 12.0F;
     const Eigen::Vector2f stretch_times_shear =
         motion[2] * motion.tail<2>() + variance * inverse.block<2, 1>(3, 2);

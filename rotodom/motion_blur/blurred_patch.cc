@@ -10,16 +10,16 @@
 namespace rotslam {
 namespace {
 
-// Rows of windows are whole numbers of these.
+// Row lengths of windows are multiples of this.
 constexpr int kLanes = 8;
 using Lanes = Eigen::Map<Eigen::Array<float, kLanes, 1>>;
 
 int RoundedUp(int size) { return (size + kLanes - 1) / kLanes * kLanes; }
 
-// A part of an image around a point, blurred.
+// A blurred part of an image around a point.
 struct BlurredWindow {
   cv::Mat pixels;
-  Eigen::Vector2d origin_px;  // where its first pixel is in the image
+  Eigen::Vector2d origin_px;  // position of its first pixel in the image
 };
 
 // Weight of the pixel at an offset.
@@ -28,15 +28,16 @@ struct Tap {
   float weight;
 };
 
-// The mean along a blur vector, bilinear between pixels.
+// Weights of the mean along a blur vector, bilinear between pixels.
 std::vector<Tap> TapsOf(const Eigen::Vector2d& blur_px) {
-  // Two steps at least: short blur vectors smooth a little, not all at once.
+  // At least two steps, so that the smoothing grows continuously from short blur vectors on.
   const int num_steps =
       blur_px.isZero() ? 1 : std::max(2, static_cast<int>(std::ceil(blur_px.norm())));
   std::vector<Tap> taps;
   const auto add = [&](const Eigen::Vector2i& offset, double weight) {
     if (weight == 0.0) return;
-    // Steps of up to a pixel: only the last two can have used it, too.
+    // Steps are at most a pixel long, so only the taps of the last two steps can be at the same
+    // pixel.
     constexpr std::ptrdiff_t kRecent = 8;
     const auto recent = taps.end() - std::min(kRecent, std::ssize(taps));
     auto tap = std::find_if(recent, taps.end(), [&](const Tap& t) { return t.offset == offset; });
@@ -55,7 +56,7 @@ std::vector<Tap> TapsOf(const Eigen::Vector2d& blur_px) {
   return taps;
 }
 
-// Row by row; beyond its border the image goes on as it ends there.
+// Copies a window row by row; border pixels are replicated.
 std::vector<float> CopyWindow(const cv::Mat& image,
                               const Eigen::Vector2i& origin,
                               const Eigen::Vector2i& size) {
@@ -76,10 +77,10 @@ std::vector<float> CopyWindow(const cv::Mat& image,
 }
 
 // The mean of the image along the blur vector, for each pixel within `half_side` of the centre.
-BlurredWindow BlurVectorAround(const cv::Mat& image,
-                               const Eigen::Vector2d& center_px,
-                               const Eigen::Vector2d& blur_px,
-                               int half_side) {
+BlurredWindow BlurAround(const cv::Mat& image,
+                         const Eigen::Vector2d& center_px,
+                         const Eigen::Vector2d& blur_px,
+                         int half_side) {
   const int side = 2 * half_side + 1;
   const int stride = RoundedUp(side);
   const Eigen::Vector2i margin = (0.5 * blur_px.cwiseAbs()).array().ceil().cast<int>() + 1;
@@ -107,11 +108,11 @@ BlurredWindow BlurVectorAround(const cv::Mat& image,
 bool AreBlurredAlike(const Eigen::Matrix2d& target_from_view,
                      const Eigen::Vector2d& blur_in_view,
                      const Eigen::Vector2d& blur_in_target) {
-  constexpr double kDifferenceThatShowsPx = 0.5;
+  constexpr double kVisibleDifferencePx = 0.5;  // less blur than that of interpolation
   const Eigen::Vector2d blur_vector = target_from_view * blur_in_view;
-  // Nobody sees which way something moved.
+  // The sign of a blur vector has no effect.
   return std::min((blur_vector - blur_in_target).norm(), (blur_vector + blur_in_target).norm()) <=
-         kDifferenceThatShowsPx;
+         kVisibleDifferencePx;
 }
 
 std::optional<PatchAlignment> AlignBlurredPatch(const BlurredPatch& patch,
@@ -119,10 +120,11 @@ std::optional<PatchAlignment> AlignBlurredPatch(const BlurredPatch& patch,
                                                 const Eigen::Vector2d& start_px,
                                                 const Eigen::Vector2d& blur_px,
                                                 double max_step_px) {
-  // At the border of what a lens model is good for, blur vectors and warps may be anything.
+  // Near the limits of a lens model, blur vectors and warps may be arbitrarily large: bounds in
+  // pixels, and as a ratio of lengths.
   constexpr double kLongestBlurPx = 4.0 * kPatchSide;
   constexpr double kMostStretch = 4.0;
-  // What a patch reaches beyond its centre: half of it, a pixel for gradients and two for rounding.
+  // Extent of a patch around its centre, px: half of it, one for gradients and two for rounding.
   constexpr int kReach = kPatchSide / 2 + 3;
   const Eigen::Matrix2d view_from_target = patch.target_from_view.inverse();
   const Eigen::Vector2d blur_in_view = view_from_target * blur_px;
@@ -131,14 +133,14 @@ std::optional<PatchAlignment> AlignBlurredPatch(const BlurredPatch& patch,
   const double longest_px = std::max(blur_in_view.norm(), blur_in_target.norm());
   if (!(longest_px <= kLongestBlurPx && stretch <= kMostStretch)) return std::nullopt;
   const BlurredWindow from =
-      BlurVectorAround(patch.image,
-                       patch.center_px,
-                       blur_in_view,
-                       static_cast<int>(std::ceil(std::max(1.0, stretch) * kReach)));
+      BlurAround(patch.image,
+                 patch.center_px,
+                 blur_in_view,
+                 static_cast<int>(std::ceil(std::max(1.0, stretch) * kReach)));
   const auto sampled =
       PatchTemplate::Sample(from.pixels, patch.center_px - from.origin_px, patch.target_from_view);
   if (!sampled) return std::nullopt;
-  const BlurredWindow in = BlurVectorAround(
+  const BlurredWindow in = BlurAround(
       target, start_px, blur_in_target, kReach + static_cast<int>(std::ceil(max_step_px)));
   auto found = AlignPatch(*sampled, in.pixels, start_px - in.origin_px, max_step_px);
   if (found) found->center_px += in.origin_px;

@@ -9,37 +9,37 @@
 
 namespace rotslam {
 
-/// Blur is matched where frames around tell how fast the camera turns; farther apart in time they
-/// do not (a hand at 10 frames a second: half of the orientations were lost).
+/// Longest time between frames from which rotation rates for blur are computed, s. Over longer
+/// times the rate of a hand-held camera changes, and matching patches by the wrong blur loses most
+/// of them.
 inline constexpr double kFarthestFrameForBlur_s = 0.09;
 
-/// A patch of an image that moved while it was exposed.
+/// A patch of an image with motion blur.
 struct BlurredPatch {
   const cv::Mat& image;  // 8-bit grey
   Eigen::Vector2d center_px;
   Eigen::Matrix2d target_from_view;  // PatchTemplate::Sample's patch_from_view
-  Eigen::Vector2d blur_px;           // of what it shows, from the exposure's begin to its end
+  Eigen::Vector2d blur_px;           // image motion of its content during the exposure
 };
 
-/// Whether blur vectors differ too little to show.
+/// Whether two blur vectors differ too little to matter.
 /// @param target_from_view  as of BlurredPatch, like the blur vectors in pixels.
 bool AreBlurredAlike(const Eigen::Matrix2d& target_from_view,
                      const Eigen::Vector2d& blur_in_view,
                      const Eigen::Vector2d& blur_in_target);
 
-/// AlignPatch between images that moved differently while they were exposed.
+/// AlignPatch for two images with different motion blur.
 ///
-/// Exposure blurs an image along the blur vector, evenly and to both sides of where it is halfway.
-/// Each of the two is blurred once more, by the other's blur vector; then they show the same,
-/// whatever the scene. Blurring only the sharper one, up to the same variance, leaves a third of
-/// the error.
+/// Motion during the exposure blurs an image evenly along the blur vector, centred on the position
+/// at mid-exposure. Each of the two patches is blurred once more by the blur vector of the other,
+/// so that both have the same blur for any scene. Blurring only the sharper one to the same
+/// variance leaves a third of the error.
 /// @param blur_px  of the target, around `start_px`.
-/// @return  as AlignPatch; nullopt, too, where blurring leaves no structure in some direction, and
-///          for blur vectors of more than four patches.
-/// Error:   0.04 px in the median between a sharp image and one blurred by 10 px (blur tests),
-/// where
-///          AlignPatch has 0.7.
-/// Cost:    2 to 4 us, by the length of the blur vectors; AlignPatch takes 0.2 to 0.5.
+/// @return  as AlignPatch; nullopt also where blurring leaves no structure in some direction, and
+///          for blur vectors longer than four patches.
+/// Error:   0.04 px in the median between a sharp image and one blurred by 10 px, 0.7 px with
+///          AlignPatch (blur tests).
+/// Cost:    2 to 4 us, growing with the blur vectors; AlignPatch takes 0.2 to 0.5.
 std::optional<PatchAlignment> AlignBlurredPatch(const BlurredPatch& patch,
                                                 const cv::Mat& target,
                                                 const Eigen::Vector2d& start_px,

@@ -16,20 +16,20 @@
 namespace rotslam {
 namespace {
 
-constexpr double kBetweenCandidates_s = 0.0025;
-constexpr int kMostPatches = 32;
-constexpr int kFewestPatches = 12;
-// How far a patch may be from where it was followed to.
+constexpr double kBetweenCandidates_s = 0.0025;  // step of the exposure times, up to 40 ms
+constexpr int kMostPatches = 32;                 // per pair of views, bounds the time
+constexpr int kFewestPatches = 12;               // for a mean that single patches do not dominate
+// Largest distance of a patch from its tracked position, px.
 constexpr double kPatchReachPx = 3.0;
-// What a pair still counts after the next one.
+// Factor on the weight of older pairs for each new pair.
 constexpr double kMemory = 0.95;
-// Gain over exchanged blur vectors, in nats a patch, that is no chance: sharp images have 0.2 at
-// most, 3 px of blur 0.5 to 1.
+// Smallest gain over exchanged blur vectors that is significant, nats per patch: sharp images reach
+// 0.2, 3 px of blur 0.5 to 1.
 constexpr double kLeastGain = 0.4;
-// A blur of 2 px within 20 ms.
+// Smallest difference of the image speeds: 2 px of blur within 20 ms.
 constexpr double kSlowestDifference_px_per_s = 100.0;
 
-// One point in two images, with the speed at which it moves in either.
+// One point in two images, with its speed in each.
 struct MovingPoint {
   int index_i;
   int index_j;
@@ -60,22 +60,22 @@ std::vector<MovingPoint> CommonPoints(const Camera& camera,
   return points;
 }
 
-// Adds the mean of the points to what is left of earlier pairs.
-template <class Unlikeness>
-void UpdateKeyframes(const std::vector<Unlikeness>& of_points, Unlikeness& remembered) {
-  for (std::size_t candidate = 0; candidate < remembered.size(); ++candidate) {
+// Adds the mean over the points to the weighted sum over earlier pairs.
+template <class Dissimilarity>
+void AddToSum(const std::vector<Dissimilarity>& of_points, Dissimilarity& weighted_sum) {
+  for (std::size_t candidate = 0; candidate < weighted_sum.size(); ++candidate) {
     double sum = 0.0;
-    for (const Unlikeness& of_point : of_points) sum += of_point[candidate];
-    remembered[candidate] =
-        kMemory * remembered[candidate] + sum / static_cast<double>(of_points.size());
+    for (const Dissimilarity& of_point : of_points) sum += of_point[candidate];
+    weighted_sum[candidate] =
+        kMemory * weighted_sum[candidate] + sum / static_cast<double>(of_points.size());
   }
 }
 
 }  // namespace
 
-bool ExposureMeter::Tells(const Eigen::Vector3d& rate_i,
-                          const Eigen::Vector3d& rate_j,
-                          double focal_px) {
+bool ExposureMeter::IsInformative(const Eigen::Vector3d& rate_i,
+                                  const Eigen::Vector3d& rate_j,
+                                  double focal_px) {
   const double slow = std::min(rate_i.norm(), rate_j.norm());
   const double fast = std::max(rate_i.norm(), rate_j.norm());
   return 2.0 * slow <= fast && (fast - slow) * focal_px >= kSlowestDifference_px_per_s;
@@ -90,14 +90,14 @@ void ExposureMeter::Add(const Camera& camera,
   const View& view_i = *i.oriented.view;
   const View& view_j = *j.oriented.view;
   const Rotation j_from_i = j.oriented.cam_from_world * i.oriented.cam_from_world.Inverse();
-  std::vector<Unlikeness> of_points(points.size());
-  std::vector<Unlikeness> reversed(points.size());
+  std::vector<Dissimilarity> of_points(points.size());
+  std::vector<Dissimilarity> reversed(points.size());
   ParallelFor(static_cast<int>(points.size()), num_threads, [&](int k) {
     const MovingPoint& point = points[k];
     const Eigen::Matrix2d j_from_i_px =
         PatchWarp(camera, view_i.features.bearings[point.index_i], j_from_i);
     const Eigen::Matrix2d i_from_j_px = j_from_i_px.inverse();
-    const auto unlikeness = [&](const Eigen::Vector2d& blur_i, const Eigen::Vector2d& blur_j) {
+    const auto dissimilarity = [&](const Eigen::Vector2d& blur_i, const Eigen::Vector2d& blur_j) {
       const BlurredPatch patch{view_i.pyramid.levels.front(),
                                view_i.features.keypoints_px[point.index_i],
                                j_from_i_px,
@@ -107,7 +107,8 @@ void ExposureMeter::Add(const Camera& camera,
                                            view_j.features.keypoints_px[point.index_j],
                                            blur_j,
                                            kPatchReachPx);
-      // A patch that is not found is as unlike as can be; one that is exact is a rendering.
+      // A patch that is not found has correlation zero; the upper bound keeps the logarithm finite
+      // for exact patches of renderings.
       const double correlation = found ? std::clamp(found->correlation, 0.0, 0.9999) : 0.0;
       return std::log(1.0 - correlation * correlation);
     };
@@ -115,22 +116,22 @@ void ExposureMeter::Add(const Camera& camera,
       const double exposure_s = candidate * kBetweenCandidates_s;
       const Eigen::Vector2d blur_i = exposure_s * point.velocity_i;
       const Eigen::Vector2d blur_j = exposure_s * point.velocity_j;
-      of_points[k][candidate] = unlikeness(blur_i, blur_j);
-      reversed[k][candidate] = unlikeness(i_from_j_px * blur_j, j_from_i_px * blur_i);
+      of_points[k][candidate] = dissimilarity(blur_i, blur_j);
+      reversed[k][candidate] = dissimilarity(i_from_j_px * blur_j, j_from_i_px * blur_i);
     }
   });
   weight_ = kMemory * weight_ + 1.0;
-  UpdateKeyframes(of_points, unlikeness_);
-  UpdateKeyframes(reversed, unlikeness_reversed_);
+  AddToSum(of_points, dissimilarity_);
+  AddToSum(reversed, dissimilarity_reversed_);
 }
 
 double ExposureMeter::Seconds() const {
-  const auto best = std::min_element(unlikeness_.begin(), unlikeness_.end());
-  const auto index = best - unlikeness_.begin();
-  if (index == 0 || unlikeness_reversed_[index] - *best < kLeastGain * weight_) return 0.0;
+  const auto best = std::min_element(dissimilarity_.begin(), dissimilarity_.end());
+  const auto index = best - dissimilarity_.begin();
+  if (index == 0 || dissimilarity_reversed_[index] - *best < kLeastGain * weight_) return 0.0;
   double candidate = static_cast<double>(index);
-  // Between the candidates, by the parabola through the best and those next to it.
-  if (std::next(best) != unlikeness_.end()) {
+  // Minimum of the parabola through the best candidate and its neighbours.
+  if (std::next(best) != dissimilarity_.end()) {
     const double before = *std::prev(best);
     const double after = *std::next(best);
     const double bend = before - 2.0 * *best + after;

@@ -7,9 +7,9 @@
 namespace rotslam {
 namespace {
 
-// What is blurred more is not found again, or not taken for the same.
+// Largest blur vector, px: keypoints with more blur are not tracked or matched.
 constexpr double kLongestBlur = 1.4;
-// Over which the image's speed is worked out.
+// Time step of the numerical derivative of the image position.
 constexpr double kShortTime_s = 1e-3;
 
 }  // namespace

@@ -14,7 +14,7 @@
 namespace rotslam {
 namespace {
 
-// Keypoints are no better than this, whatever their covariances say.
+// Lower bound of a keypoint's standard deviation, px: interpolation and calibration limit it.
 constexpr double kSmallestSigmaPx = 0.02;
 
 // Squared errors of a match in units of its covariance.
@@ -24,7 +24,7 @@ struct WhitenedErrors {
   double shared = 0.0;    // of an error as large as the shared one, along the line
 };
 
-// In units of a squared pixel.
+// Covariance of the difference of the two bearings, px^2.
 Eigen::Matrix2d CovarianceOfDifference(const Eigen::Vector3d& bearing_i,
                                        const Eigen::Vector3d& bearing_j,
                                        const Eigen::Matrix3d& R_j_i,
@@ -71,7 +71,7 @@ class Whitening {
   double squared_pixel_;
 };
 
-// Robust variance of the errors across the lines: they have one dimension.
+// Robust variance of the one-dimensional errors across the lines.
 double VarianceAcross(const std::vector<WhitenedErrors>& errors) {
   std::vector<double> squares;
   squares.reserve(errors.size());
@@ -79,10 +79,9 @@ double VarianceAcross(const std::vector<WhitenedErrors>& errors) {
   return kSigmasPerMedianDeviation * kSigmasPerMedianDeviation * Median(std::move(squares));
 }
 
-// The most that the errors of one view pair show in any direction, in standard deviations: with
-// that probability a chi-square variable of four degrees of freedom stays below its square. The
-// directions are a family of two parameters; for translations in the image plane alone two degrees
-// would be exact.
+// Threshold for the maximum over all directions, in standard deviations: the quantile of a
+// chi-square variable with four degrees of freedom. The directions are a family of two parameters;
+// for translations in the image plane alone two degrees would be exact.
 double CriticalSigmas(double false_alarm_rate) {
   double low = 0.0;
   double high = 1e3;
@@ -132,7 +131,7 @@ BaselineEvidence TestBaseline(const PairArrays& pairs,
   double shared = 0.0;
   for (const WhitenedErrors& error : errors) {
     const double of_line = std::min(error.epipolar, squared_clip * variance);
-    // What may be shared must not hide what is beyond it.
+    // The clipping limit includes the shared error, so that evidence beyond it is not clipped.
     const double limit = squared_clip * (variance + error.shared);
     const double beyond = std::clamp(error.rotation - error.epipolar, -limit, limit) - of_line;
     across += of_line;
@@ -141,10 +140,11 @@ BaselineEvidence TestBaseline(const PairArrays& pairs,
     shared += error.shared;
   }
   const double n = static_cast<double>(pairs.size());
-  // Exact matches have no noise to measure anything by.
+  // Exact matches have no noise from which a scale could be estimated.
   if (!(across > 0.0)) return {};
   const double mean = sum / n;
-  // What the epipolar fit takes out of its errors by its unknowns, and the rotation's does not.
+  // Bias by the unknowns of the epipolar fit, in degrees of freedom: it reduces the errors of that
+  // model only.
   constexpr double kFitted = 7.0;
   const double allowed = ((options.anisotropy + kFitted / n) * across + shared) / n;
   const double spread = std::max(squares / n - mean * mean, 1e-12 * variance * variance);

@@ -39,47 +39,46 @@ struct BaselineTestOptions {
   }
 };
 
-/// How well the two keypoints of a match are known, each in its own image.
+/// Covariances of the two keypoints of a match, each in its own image.
 struct KeypointCovariances {
   Eigen::Matrix2d i_px = Eigen::Matrix2d::Identity();
   Eigen::Matrix2d j_px = Eigen::Matrix2d::Identity();
 };
 
-/// Two hypotheses about the same matches at their best.
+/// The best model without and with a baseline for the same matches.
 struct BaselineHypotheses {
   Rotation rotation;       // j_from_i without a baseline
   EpipolarModel epipolar;  // with one
 };
 
 struct BaselineEvidence {
-  // Flow along the epipolar lines in excess of the flow across them, mean square of the clipped
-  // whitened errors, as a share of the latter. Zero in expectation without a baseline, up to eight
-  // with one.
+  // Flow along the epipolar lines in excess of that across them, relative to the latter: mean
+  // squares of the clipped whitened errors. The expectation is zero without a baseline, and at most
+  // eight with one.
   double excess = 0.0;
-  // What of it is beyond the allowed anisotropy and shared errors, in standard deviations.
+  // The part of it beyond the allowed anisotropy and shared errors, in standard deviations.
   double sigmas = 0.0;
-  // sigmas as a share of what the false-alarm rate asks for: above one, there is a baseline.
+  // `sigmas` relative to the threshold for the false-alarm rate: above one there is a baseline.
   double strength = 0.0;
 
   bool ShowsBaseline() const { return strength > 1.0; }
 };
 
-/// Tests whether the matches of two views show that the views are from two places.
+/// Tests whether the camera has moved between two views.
 ///
-/// A ratio of likelihoods: without a baseline the error of a match has two dimensions, with one it
-/// has the one across its epipolar line, and the position along the line is the point's depth. So
-/// the residual sum of the rotation less that of the epipolar model is what moves along the lines.
-/// Errors are the same in both dimensions once whitened, so without a baseline that sum equals the
-/// residual sum of the epipolar model in expectation, whatever the noise: nobody has to know its
-/// size or distribution. The epipolar model takes the direction in which there is least error
-/// across; the threshold is for the largest of all directions.
+/// A likelihood ratio test. Without a baseline the error of a match has two dimensions. With one it
+/// has the dimension across the epipolar line, and the position along the line is the depth of the
+/// point. The residual sum of the rotation less that of the epipolar model is therefore the motion
+/// along the lines. Whitened errors are equal in both dimensions, so that without a baseline the
+/// difference equals the residual sum of the epipolar model in expectation; size and distribution
+/// of the noise need not be known. The epipolar model selects the direction with the least error
+/// across, so the threshold is that for the maximum over all directions.
 /// @param covariances      one per pair, or none: all alike.
 /// @param shared_error_px  standard deviation of errors that neighbouring matches have in common,
 ///                         which may therefore point along the lines.
 /// @param focal_px         pixels per radian.
-/// Error:   without allowances (anisotropy, shared errors), of pairs of views from one place 2.5 to
-///          3.5 % show a baseline where 5 % are asked for and 1.0 to 1.3 % where 1 % are (100 and
-///          400 matches, 0.05 and 0.5 px; 400 scenes each).
+/// Error:   without allowances for anisotropy and shared errors, 2.5 to 3.5 % of pairs without a
+///          baseline fail at a false-alarm rate of 5 %, and 1.0 to 1.3 % at 1 % (baseline tests).
 /// Source:  Torr, Geometric motion segmentation and model selection, 1998, has the two models; the
 ///          test is ours.
 BaselineEvidence TestBaseline(const PairArrays& pairs,

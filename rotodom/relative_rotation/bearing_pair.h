@@ -6,15 +6,14 @@
 
 namespace rotslam {
 
-/// How well a match is known, relative to a nominal match, whose two bearings err by the same
-/// amount in every direction and by one unit of variance. Only ratios between matches matter: the
-/// size of the unit is measured.
+/// Uncertainty of a match relative to a nominal match, whose two bearings have a unit variance in
+/// every direction. Only ratios between matches matter, since the unit is estimated.
 struct MatchNoise {
   // Covariance of bearing_j in the plane perpendicular to it, along the columns of
   // TangentBasis(bearing_j); `TangentCovariance` makes it from one in the image.
   Eigen::Matrix2d covariance_j = Eigen::Matrix2d::Identity();
-  // Variance of bearing_i, in every direction. Zero where covariance_j holds the whole error of the
-  // match, as that of a patch which was followed from view i to view j.
+  // Variance of bearing_i, in every direction. Zero where covariance_j is the covariance of the
+  // whole match, as for a patch that was tracked from view i to view j.
   double variance_i = 1.0;
 };
 
@@ -29,18 +28,18 @@ struct BearingPair {
 /// they form an orthonormal basis.
 Eigen::Matrix<double, 3, 2> TangentBasis(const Eigen::Vector3d& direction);
 
-/// Carries the covariance of an image position to the bearing there.
+/// Propagates the covariance of an image position to its bearing.
 /// @param bearing           unit, in front of the camera (z > 0).
 /// @param image_covariance  2x2, of (x / z, y / z) or, the camera's distortion neglected, of
 /// pixels.
-/// @return  2x2 for MatchNoise::covariance_j, in the unit of `image_covariance`. One unit in the
-///          image becomes less than one on the sphere away from the optical axis.
+/// @return  2x2 for MatchNoise::covariance_j, in the unit of `image_covariance`. Away from the
+///          optical axis a unit in the image is less than one on the sphere.
 Eigen::Matrix2d TangentCovariance(const Eigen::Vector3d& bearing,
                                   const Eigen::Matrix2d& image_covariance);
 
-/// The covariance of what R f_i and f_j differ by, f_i and f_j being bearings of one point in two
-/// images: for MatchNoise::covariance_j, with variance_i = 0.
-/// @param image_covariance_i, image_covariance_j  of where the two images show it.
+/// Covariance of the difference of R f_i and f_j, bearings of one point in two images: for
+/// MatchNoise::covariance_j, with variance_i = 0.
+/// @param image_covariance_i,  image_covariance_j  covariances of its two image positions.
 Eigen::Matrix2d DifferenceCovariance(const Eigen::Vector3d& bearing_i,
                                      const Eigen::Matrix2d& image_covariance_i,
                                      const Eigen::Vector3d& bearing_j,

@@ -17,16 +17,16 @@
 namespace rotslam {
 namespace {
 
-// Matches that descents run on.
+// Number of matches used by a descent, which bounds its cost.
 constexpr int kThinnedSize = 250;
-// Samples start from rotations up to this far from the best one. At the parallax of neighbouring
-// frames minima lie 1 deg from one another, at wide baselines farther.
+// Largest angle between the best rotation and the starts of samples. At the parallax of
+// neighbouring frames minima are about 1 deg apart, at wide baselines more.
 constexpr double kStartScatterDeg = 4.0;
-// Scores no farther apart than this, by inlier, do not tell which of two minima is right: of pairs
-// where one was, to 2 deg, it was that of the worse score in 74 of 124 at every fourth frame of TUM
-// fr1_rpy, and in 16 of 46 on EuRoC V1_01 keyframes.
+// Largest difference of two scores per inlier, nats, at which either minimum may be the right one.
+// Among real pairs of views for which one of two such minima was right, that was the one with the
+// worse score in half of the cases.
 constexpr double kLargestExcess = 0.25;
-// Rotations less far apart are one, as far as other views can tell.
+// Rotations closer than this count as the same: edges to other views cannot separate them.
 constexpr double kOtherRotationDeg = 2.0;
 // One more than the five degrees of freedom.
 constexpr int kSmallSample = 6;
@@ -67,7 +67,7 @@ class Sampler {
   std::vector<int> drawn_;
 };
 
-// The frame that two bearings span: their sum, their difference, their normal.
+// Orthonormal frame of two bearings: their sum, difference and normal.
 Eigen::Matrix3d FrameOf(const Eigen::Vector3d& a, const Eigen::Vector3d& b) {
   Eigen::Matrix3d frame;
   frame.col(0) = (a + b).normalized();
@@ -100,18 +100,19 @@ double Quantile(std::vector<double> values, double part) {
   return *at;
 }
 
-// ScoreEpipolar with the distances to the epipolar half-lines on which points in front of both
-// cameras lie; the sign of the direction that fits better counts. A plane has two motions that fit
-// all its epipolar lines, but under the wrong one about half of it lies behind the cameras.
-// @param noise  of the distances. Flow of that size goes any way: it must not make a model better
-//               that trades some rotation for translation, so that all flow goes one way.
+// ScoreEpipolar with the distances to the epipolar half-lines, which hold the points in front of
+// both cameras, for the sign of the direction that fits better. A plane has two motions that fit
+// all its epipolar lines, but with the wrong one about half of it is behind the cameras.
+// @param noise  standard deviation of the distances. Flow of that size may have any direction;
+//               otherwise a model would be preferred that explains rotation by translation, so that
+//               all flow has one direction.
 HypothesisScore ScoreHalfLines(const PairArrays& pairs,
                                const EpipolarModel& model,
                                const std::vector<double>& squared_distances,
                                double noise,
                                double threshold,
                                double finest) {
-  // Both views' noise is in a distance, so a flow is longer by the root of two.
+  // Distances contain the noise of both views, so flows are divided by the root of two below.
   constexpr double kSigmas = 2.0;
   const double any_way = kSigmas * noise;
   const std::vector<double> squared_flows = SquaredFlows(pairs, model.j_from_i);
@@ -119,7 +120,8 @@ HypothesisScore ScoreHalfLines(const PairArrays& pairs,
   const double squared_threshold = threshold * threshold;
   const double inverse_squared_finest = 1.0 / (finest * finest);
   const double outlier = 1.0 + squared_threshold * inverse_squared_finest;
-  // One logarithm for as many factors as no product overflows with; none is above `outlier`.
+  // One logarithm per block of factors. No factor exceeds `outlier`, and the block is small enough
+  // for the product not to overflow.
   constexpr double kLargestLog = 600.0;
   const int block = std::max(1, static_cast<int>(kLargestLog / std::log(outlier)));
   std::array<HypothesisScore, 2> scores;  // of the direction and of its opposite
@@ -127,7 +129,7 @@ HypothesisScore ScoreHalfLines(const PairArrays& pairs,
   for (int k = 0; k < pairs.size(); ++k) {
     const Eigen::Vector3d g = R_j_i * pairs.BearingI(k);
     const bool is_ahead = g.cross(pairs.BearingJ(k)).dot(g.cross(model.direction)) > 0.0;
-    // The half-line ends where the point is at infinity.
+    // The half-line ends at the point at infinity.
     const double beyond_end = std::max(0.0, std::sqrt(0.5 * squared_flows[k]) - any_way);
     const double squared_behind = std::max(squared_distances[k], beyond_end * beyond_end);
     for (int sign = 0; sign < 2; ++sign) {
@@ -157,7 +159,7 @@ class Search {
 
   const Consensus& best() const { return best_; }
 
-  // The best of the minima that might as well be right and whose rotation is another one.
+  // The best other minimum within kLargestExcess whose rotation differs by kOtherRotationDeg.
   std::optional<Consensus> Alternative() const {
     std::optional<Consensus> alternative;
     double least = kLargestExcess;
@@ -181,7 +183,7 @@ class Search {
   }
 
   void DescendFromAligned(const Rotation& start) {
-    // The scale comes down as the rotation explains more of the matches.
+    // The scale decreases as the rotation explains more matches.
     constexpr int kScales = 5;
     Rotation rotation = start;
     for (int k = 0; k < kScales; ++k) {
@@ -194,12 +196,12 @@ class Search {
   void DescendFromAmbiguity() {
     FocusOn(best_.model.j_from_i);
     const auto start = PlanarAmbiguity(thinned_, best_.model, threshold_);
-    const auto twin = start ? Descend(*start) : std::nullopt;
-    if (!twin) return;
-    const HypothesisScore score = ScoreOf(*twin);
+    const auto alternative = start ? Descend(*start) : std::nullopt;
+    if (!alternative) return;
+    const HypothesisScore score = ScoreOf(*alternative);
     if (!(score.score < best_score_ - kLargestExcess * best_.num_inliers)) return;
     best_score_ = score.score;
-    best_.model = *twin;
+    best_.model = *alternative;
     best_.num_inliers = score.num_inliers;
   }
 
@@ -208,15 +210,15 @@ class Search {
     FocusOnBest();
     for (best_.num_samples = 0; best_.num_samples < SamplesNeededNow(); ++best_.num_samples) {
       bool improved = false;
-      // Two bearings fix a rotation when the baseline is small: cheap, and the way out of a bad
+      // With a small baseline two bearings determine the rotation: a cheap alternative to a wrong
       // prediction.
       const std::vector<int>& two = sampler.Draw(2, pairs_.size());
       if (const std::optional<Rotation> rotation = AlignTwo(pairs_, two[0], two[1])) {
         improved |= Consider({*rotation, best_.model.direction});
       }
-      // Large samples bear noise and small baselines better, small ones miss the wrong matches more
-      // often. So the large ones are drawn from what nearly agrees with the best model, which is
-      // mostly right also where the model is at a false minimum, and the small ones from all.
+      // Large samples are more accurate with noise and small baselines, small ones are more often
+      // free of outliers. Large ones are drawn from the matches that nearly agree with the best
+      // model, which are mostly inliers even at a false minimum; small ones from all.
       const bool large = best_.num_samples % 2 == 0;
       const std::vector<int>& from = large ? agreeing_ : near_;
       const int num_from = static_cast<int>(from.size());
@@ -235,9 +237,9 @@ class Search {
   }
 
  private:
-  // Takes the model if it is better than the best so far.
+  // Accepts the model if its score is better than the best so far.
   bool Consider(const EpipolarModel& model) {
-    // The lines alone are quickly told and never say more than the half-lines.
+    // The score of the lines is cheap and a lower bound of that of the half-lines.
     if (!(ScoreEpipolar(pairs_, model, threshold_, finest_, best_score_).score < best_score_)) {
       return false;
     }
@@ -255,15 +257,15 @@ class Search {
     return ScoreHalfLines(pairs_, model, squared_distances, noise, threshold_, finest_);
   }
 
-  // Length of flow that a good part of the matches stay below, rad.
+  // The 30th percentile of the lengths of the flow, rad.
   double TypicalFlow(const Rotation& rotation) const {
     constexpr double kPart = 0.3;
     return std::sqrt(Quantile(SquaredFlows(spread_, rotation), kPart));
   }
 
-  // Leaves to descents and samples the matches whose flow under the rotation is not out of all
-  // proportion. Most of the others are wrong; each such match has a direction of translation that
-  // suits it near to any given one, and its long flow makes that a sharp minimum.
+  // Restricts descents and samples to matches whose flow under the rotation is at most six times
+  // the typical one. Most of the others are outliers. Each of those fits a direction of translation
+  // near any given one, and its long flow creates a sharp false minimum.
   void FocusOn(const Rotation& rotation) {
     constexpr double kProportion = 6.0;
     const double longest = kProportion * (threshold_ + TypicalFlow(rotation));
@@ -275,7 +277,7 @@ class Search {
     thinned_ = PairArrays(pairs_, Thinned(near_, kThinnedSize));
   }
 
-  // The same for the best model, and finds the matches that nearly agree with it.
+  // The same for the best model; also finds the matches that nearly agree with it.
   void FocusOnBest() {
     constexpr double kNearly = 4.0;
     FocusOn(best_.model.j_from_i);
@@ -294,8 +296,8 @@ class Search {
     return RefineEpipolar(sample, model, kNoLoss, kIterations, 1e-3).model;
   }
 
-  // Refines at the scale of the noise that the model itself shows, again and again as that comes
-  // down; nullopt where an earlier descent has been.
+  // Refines the model at the scale of its own noise, which is updated a few times; nullopt where an
+  // earlier descent ended in the same minimum.
   std::optional<EpipolarModel> Descend(EpipolarModel model) {
     constexpr int kScales = 3;
     constexpr int kIterations = 4;
@@ -336,23 +338,24 @@ class Search {
   const double smallest_noise_;
   const double finest_;
 
-  std::vector<int> near_;              // see FocusOn
-  std::vector<int> agreeing_;          // see FocusOnBest
+  std::vector<int> near_;              // indices from FocusOn
+  std::vector<int> agreeing_;          // indices from FocusOnBest
   PairArrays thinned_;                 // some of them
-  std::vector<EpipolarModel> minima_;  // that descents have reached
+  std::vector<EpipolarModel> minima_;  // results of descents
   Consensus best_;
   double best_score_ = std::numeric_limits<double>::infinity();
 };
 
-// Positions of the pairs that are no likely victims of chance. A wrong match whose flow is `length`
-// and points anywhere has a distance below the threshold with the probability of an angle, and the
-// longer its flow, the more such a match pretends to know. So where the wrong matches of a length
-// explain a good part of those that agree, all of that length are left out. Close points, of long
-// flow too, stay as long as they outnumber that.
+// Indices of the pairs without likely chance inliers. An outlier with a flow of `length` in a
+// random direction has a distance below the threshold with the probability of a certain angle, and
+// the longer its flow, the larger its weight. Where outliers of some length explain more than a
+// small share of the inliers of that length, all pairs of that length are rejected. Close points,
+// which have long flow, stay while they outnumber the chance inliers.
 std::vector<int> RejectChanceInliers(const PairArrays& pairs,
                                      const EpipolarModel& model,
                                      double threshold) {
-  // Lengths by powers of two in units of the threshold; shorter flows prove nothing wrong.
+  // Bins of length are powers of two in units of the threshold; shorter flows cannot be identified
+  // as outliers.
   constexpr int kShortest = 2;
   constexpr int kBins = 16;
   constexpr double kLargestPart = 0.05;
@@ -368,7 +371,7 @@ std::vector<int> RejectChanceInliers(const PairArrays& pairs,
   }
   std::array<bool, kBins> trusted = {};
   for (int bin = 0; bin < kBins; ++bin) {
-    // r = length * sin(angle) / sqrt(2), both views' noise being in its unit.
+    // r = length * sin(angle) / sqrt(2), because its unit contains the noise of both views.
     const double sine = std::numbers::sqrt2 / std::exp2(bin + 0.5);
     const double chance = 2.0 / std::numbers::pi * std::asin(std::min(sine, 1.0));
     const double by_chance = disagree[bin] * chance / (1.0 - chance);

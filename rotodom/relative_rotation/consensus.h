@@ -8,33 +8,33 @@
 
 namespace rotslam {
 
-/// An epipolar model that many matches agree on.
+/// An epipolar model with its inliers.
 struct Consensus {
   EpipolarModel model;
   int num_inliers = 0;
-  // What its score lacks to the best model's, by inlier of that one; zero for the best itself.
+  // Difference of its score from that of the best model, per inlier of the latter; zero for the
+  // best itself.
   double excess = 0.0;
-  // Positions of the pairs, right and wrong ones, among which agreement is not by chance;
-  // ascending.
+  // Positions of the pairs, inliers and outliers, whose agreement is not by chance; ascending.
   std::vector<int> members;
   int num_samples = 0;
 };
 
-/// Searches for the model with the best score over all pairs: ScoreEpipolar with the epipolar lines
-/// ended where points would be behind the cameras.
+/// Searches for the model with the best score over all pairs: ScoreEpipolar, with the epipolar
+/// lines ending where points would be behind the cameras.
 ///
-/// With little parallax the epipolar distance has several minima, a rotation traded for a
-/// translation. So the search descends from the prediction and from the rotation that aligns the
-/// bearings best, each with every principal direction of the flow, then from small samples, and at
-/// last from the other motion that shows a plane in the same places (PlanarAmbiguity).
-/// Descents run on a part of the pairs, so that their cost does not depend on the number of pairs.
+/// With little parallax the epipolar distance has several minima, because rotation and translation
+/// have similar effects. Descents therefore start from the prediction and from the rotation that
+/// aligns the bearings best, each with every principal direction of the flow, then from small
+/// samples, and finally from the second solution for a plane (PlanarAmbiguity). They use a part of
+/// the pairs, so that their cost does not depend on the number of pairs.
 /// @param predicted_j_from_i  where to start; may be far off.
 /// @param focal_px            pixels per radian, for the thresholds.
-/// @return  the best model, and behind it the best of those minima whose rotation is another one
-///          (2 deg) and whose score is at most 0.25 by inlier worse. A twin comes first only if its
-///          score is better by more than that: wrong matches and noise that neighbours share decide
-///          between such two, not the motion. num_inliers within options.inlier_px, possibly too
-///          few to mean anything.
+/// @return  the best model, followed by the best other minimum whose rotation differs by more than
+///          2 deg and whose score per inlier is worse by at most 0.25. The second solution for a
+///          plane comes first only if its score is better by more than that: a smaller difference
+///          is caused by outliers and shared errors. num_inliers counts pairs within
+///          options.inlier_px and may be too small to be of use.
 std::vector<Consensus> FindConsensus(const PairArrays& pairs,
                                      const Rotation& predicted_j_from_i,
                                      double focal_px,

@@ -6,8 +6,8 @@
 namespace rotslam {
 namespace {
 
-// @param codimension  numbers per match that the model predicts; beyond two variances for each of
-//                     them a match is wrong.
+// @param codimension  number of constraints per match; residuals are truncated at two variances for
+//                     each.
 double Criterion(const std::vector<double>& squares,
                  double per_variance,
                  int codimension,

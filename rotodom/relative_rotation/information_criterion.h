@@ -4,17 +4,17 @@
 
 namespace rotslam {
 
-// Torr's geometric information criterion for matches, points in four dimensions (two images): what
-// a model leaves unexplained, in variances of the noise and cut off where a match is wrong, and
-// what the model costs. The smaller one is the better model; sums over pairs of views compare, too.
+// Torr's geometric information criterion for matches, which are points in four dimensions (two
+// images): the truncated residuals, in variances of the noise, plus the cost of the model. The
+// smaller value denotes the better model; sums over pairs of views can be compared as well.
 // Source:  Torr, Geometric motion segmentation and model selection, 1998.
 
-/// Of rotation and direction of translation.
+/// The criterion for rotation and direction of translation.
 /// @param squared_distances  of all matches, see SquaredDistances.
 /// @param noise              standard deviation of one view's bearings, rad.
 double EpipolarCriterion(const std::vector<double>& squared_distances, double noise);
 
-/// Of rotation alone.
+/// The criterion for rotation alone.
 /// @param squared_flows  of all matches, see SquaredFlows.
 double RotationCriterion(const std::vector<double>& squared_flows, double noise);
 

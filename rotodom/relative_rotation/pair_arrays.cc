@@ -7,9 +7,9 @@
 
 #include <Eigen/Dense>
 
-// The loops are compiled for machines with AVX2 as well as for all others, where the compiler
-// splits the lanes. Nothing but pointers and doubles crosses between the two: all that handles
-// Lanes is inlined, which GCC's note on passing them does not know.
+// The loops are compiled twice, with and without AVX2. Only pointers and doubles cross between the
+// two variants; functions with Lanes are inlined, so GCC's warning about passing them does not
+// apply.
 #if defined(__x86_64__) && defined(__GNUC__)
 #define ROTSLAM_HAS_AVX2_VARIANT 1
 #define ROTSLAM_AVX2 __attribute__((target("avx2,fma")))
@@ -22,8 +22,8 @@
 namespace rotslam {
 namespace {
 
-// Added to the squared Sampson denominator: within about 2 deg of the epipole the distance has no
-// meaning.
+// Added to the squared Sampson denominator, rad^2: within about 2 deg of the epipole the distance
+// has no meaning.
 constexpr double kEpipoleFloor = 1e-3;
 
 constexpr int kLanes = PairArrays::kLanes;
@@ -84,7 +84,7 @@ double Sum(const Lanes& lanes) {
   return sum;
 }
 
-// A model as the loops read it.
+// A model in plain arrays for the loops.
 struct PlainModel {
   double R[9];  // row-major
   double t[3];
@@ -105,7 +105,7 @@ PlainModel Plain(const EpipolarModel& model) {
   return plain;
 }
 
-// What the numerator e and the variance D of the Sampson distance are made of.
+// Terms of the numerator e and the variance D of the Sampson distance.
 struct Terms {
   Lanes3 g, f, n;  // R f_i, f_j, g x f
   Lanes along_i;   // t . g
@@ -274,14 +274,14 @@ ROTSLAM_INLINE HypothesisScore ScoreEpipolarLoop(const PairArrays& pairs,
                                                  const PlainModel& model,
                                                  const ScoreScales& scales) {
   const double outlier = 1.0 + scales.squared_threshold * scales.inverse_squared_finest;
-  // Logarithms are slow: take one of the product of a whole block, none of whose factors is above
-  // `outlier`, so that the product stays below the largest double.
+  // Logarithms are slow: one is taken of the product of a block. No factor exceeds `outlier`, so
+  // that the product stays below the largest double.
   constexpr double kLargestLog = 600.0;
   constexpr int kMaxSteps = 16;
   const double steps = kLargestLog / (kLanes * std::log(outlier) + 1e-300);
   const int block = kLanes * std::max(1, static_cast<int>(std::min<double>(steps, kMaxSteps)));
   HypothesisScore result;
-  // The padding counts as outliers; it must cost nothing.
+  // The padding counts as outliers; their cost is subtracted here.
   result.score = (pairs.size() - pairs.padded_size()) * std::log(outlier);
   double count = 0.0;
   for (int begin = 0; begin < pairs.padded_size(); begin += block) {
@@ -469,7 +469,7 @@ PairArrays::PairArrays(const std::vector<BearingPair>& pairs) {
     const Eigen::Matrix3d along = pair.bearing_j * pair.bearing_j.transpose();
     set_symmetric(kCovarianceJ, k, along + basis * noise.covariance_j * basis.transpose());
     MutableRow(kVarianceI)[k] = noise.variance_i;
-    // A match whose error is said to be zero has a finite weight all the same.
+    // A small constant keeps the weight of a match with zero covariance finite.
     Eigen::Matrix2d mean = 0.5 * noise.covariance_j;
     mean.diagonal().array() += 0.5 * noise.variance_i + 1e-6;
     set_symmetric(kInformation, k, along + basis * mean.inverse() * basis.transpose());

@@ -11,27 +11,27 @@
 namespace rotslam {
 
 /// Rotation and direction of translation between two views: x_j = R x_i + s t. The sign of the
-/// direction does not matter here.
+/// direction has no meaning here.
 struct EpipolarModel {
   Rotation j_from_i;
   Eigen::Vector3d direction = Eigen::Vector3d::UnitX();  // unit
 };
 
-/// Bearing pairs, one array per coordinate, as the loops below want them. Immutable.
+/// Bearing pairs with one array per coordinate, for vectorised loops. Immutable.
 class PairArrays {
  public:
   PairArrays() = default;
   explicit PairArrays(const std::vector<BearingPair>& pairs);
-  /// Some of the pairs, in the order of `indices`.
+  /// Copies some of the pairs, in the order of `indices`.
   PairArrays(const PairArrays& all, std::span<const int> indices);
 
   /// About `count` of the pairs, evenly spread over their order.
   PairArrays Thinned(int count) const;
 
   int size() const { return size_; }
-  /// Whether a pair has a MatchNoise; the nominal ones among them are then spelt out.
+  /// Whether any pair has a MatchNoise; nominal pairs then have explicit covariances, too.
   bool weighted() const { return weighted_; }
-  /// Length of an array: size() and zeros up to a multiple of kLanes.
+  /// Length of an array: size() rounded up to a multiple of kLanes; the rest is zero.
   int padded_size() const { return padded_size_; }
   /// Coordinate `row` of all pairs, see Row.
   const double* row(int row) const { return data_.data() + std::ptrdiff_t{row} * padded_size_; }
@@ -74,10 +74,10 @@ struct RotationNormal {
   Eigen::Vector3d gradient;
 };
 
-/// What a hypothesis is worth.
+/// Score of a hypothesis.
 struct HypothesisScore {
   double score = 0.0;   // smaller is better
-  int num_inliers = 0;  // only counted to the end when the score stayed below the limit
+  int num_inliers = 0;  // complete only when the score stayed below the limit
 };
 
 // The loops over all pairs. They use AVX2 where the machine has it.
@@ -91,9 +91,9 @@ EpipolarNormal LinearizeEpipolar(const PairArrays& pairs, const EpipolarModel& m
 
 RotationNormal LinearizeRotation(const PairArrays& pairs, const Rotation& j_from_i, double loss);
 
-/// Sum of log(1 + r^2 / finest^2), cut off at `threshold`. A match is worth more the nearer it is
-/// at every scale above `finest`, so that two models which share their inliers are told apart by
-/// the matches' own noise, whatever that is. Gives up once the sum reaches `limit`.
+/// Sum of log(1 + r^2 / finest^2), truncated at `threshold`. The score rises with the accuracy of a
+/// match at every scale above `finest`, so that two models with the same inliers are ranked by the
+/// noise of the matches, whatever its size. Stops once the sum reaches `limit`.
 HypothesisScore ScoreEpipolar(const PairArrays& pairs,
                               const EpipolarModel& model,
                               double threshold,

@@ -12,10 +12,10 @@
 namespace rotslam {
 namespace {
 
-constexpr std::size_t kFewestPairs = 10;
+constexpr std::size_t kFewestPairs = 10;  // three determine a plane; ten leave room for outliers
 
-// A pair asks n . point = value of the plane n in whose homography R + t n^T it lies, all in units
-// of an angle: how far the pair moves along its epipolar line is n . f_i.
+// Equation n . point = value of a pair for the plane n with homography R + t n^T. Units are
+// radians: n . f_i is the flow of the pair along its epipolar line.
 struct PlaneEquation {
   Eigen::Vector3d point;
   double value = 0.0;
@@ -41,15 +41,15 @@ std::vector<PlaneEquation> EquationsOf(const PairArrays& pairs,
   return equations;
 }
 
-// The plane on which most pairs lie, by iteratively re-weighted least squares whose scale comes
-// down as the plane explains more of them.
+// Fits the plane on which most pairs lie by iteratively re-weighted least squares with a decreasing
+// scale.
 Eigen::Vector3d FitPlane(const std::vector<PlaneEquation>& equations, double threshold) {
   constexpr int kRounds = 8;
   Eigen::Vector3d normal = Eigen::Vector3d::Zero();
   double scale = std::numeric_limits<double>::infinity();
   std::vector<double> errors(equations.size());
   for (int round = 0; round < kRounds; ++round) {
-    // Points in a line fix no plane; the smallest one will do.
+    // Points on a line determine no plane; the damping selects the smallest n.
     Eigen::Matrix3d H = 1e-12 * Eigen::Matrix3d::Identity();
     Eigen::Vector3d b = Eigen::Vector3d::Zero();
     for (const auto& [point, value] : equations) {
@@ -76,7 +76,7 @@ std::optional<EpipolarModel> PlanarAmbiguity(const PairArrays& pairs,
   if (equations.size() < kFewestPairs) return std::nullopt;
   const Eigen::Vector3d normal = FitPlane(equations, threshold);
   Eigen::Matrix3d H = model.j_from_i.Matrix() + model.direction * normal.transpose();
-  // Whoever sees the same side of the plane twice has a homography of positive determinant.
+  // If both views see the same side of the plane, the homography has a positive determinant.
   if (!H.allFinite() || !(H.determinant() > 0.0)) return std::nullopt;
   const Eigen::JacobiSVD<Eigen::Matrix3d> svd(H, Eigen::ComputeFullV);
   const Eigen::Vector3d singular = svd.singularValues() / svd.singularValues()[1];
@@ -85,9 +85,9 @@ std::optional<EpipolarModel> PlanarAmbiguity(const PairArrays& pairs,
   const double shrink = std::max(0.0, 1.0 - singular[2] * singular[2]);
   if (!(stretch + shrink > threshold * threshold)) return std::nullopt;
 
-  // Either motion keeps the length of one of two directions in the plane of the first and the last
-  // singular vector, and of the middle one.
-  std::optional<EpipolarModel> twin;
+  // Each of the two motions preserves the length of the middle singular vector and of one of two
+  // directions in the plane of the first and last one.
+  std::optional<EpipolarModel> alternative;
   double farthest = 0.0;
   for (const double sign : {-1.0, 1.0}) {
     const Eigen::Vector3d middle = svd.matrixV().col(1);
@@ -105,9 +105,9 @@ std::optional<EpipolarModel> PlanarAmbiguity(const PairArrays& pairs,
     const double away = (j_from_i * model.j_from_i.Inverse()).Angle();
     if (away < farthest) continue;
     farthest = away;
-    twin = EpipolarModel{j_from_i, translation.normalized()};
+    alternative = EpipolarModel{j_from_i, translation.normalized()};
   }
-  return twin;
+  return alternative;
 }
 
 }  // namespace rotslam

@@ -12,8 +12,8 @@ namespace {
 
 using Vector5 = Eigen::Matrix<double, 5, 1>;
 
-// Solves the damped normal equations, the direction eliminated. The direction's block vanishes with
-// the baseline; it is damped by its own size.
+// Solves the damped normal equations with the direction eliminated. The block of the direction
+// vanishes with the baseline, so its damping is relative to its own size.
 Vector5 DampedStep(const EpipolarNormal& normal, double damping) {
   constexpr double kTiny = 1e-300;
   Eigen::Matrix3d H_rr = normal.H.topLeftCorner<3, 3>();
@@ -53,7 +53,7 @@ EpipolarFit RefineEpipolar(const PairArrays& pairs,
       damping *= 10.0;
       continue;
     }
-    // What the quadratic model promises, the damping's part left out.
+    // Decrease of the cost predicted by the quadratic model without damping.
     const double promised =
         -step.dot(2.0 * fit.normal.gradient + fit.normal.H.selfadjointView<Eigen::Upper>() * step);
     if (promised <= tolerance * fit.normal.cost) break;
@@ -90,7 +90,7 @@ Eigen::Matrix3d TranslationAxes(const PairArrays& pairs, const Rotation& j_from_
   const Eigen::Matrix3d R_j_i = j_from_i.Matrix();
   for (int k = 0; k < pairs.size(); ++k) {
     const Eigen::Vector3d n = (R_j_i * pairs.BearingI(k)).cross(pairs.BearingJ(k));
-    // Normalising bounds what one wrong match can do.
+    // Normalised, so that the influence of a single outlier is bounded.
     M += n * n.transpose() / (n.squaredNorm() + 1e-6);
   }
   return Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d>(M).eigenvectors();
@@ -104,7 +104,7 @@ double NoiseOf(const std::vector<double>& squared_distances, double threshold, d
   };
   const std::ptrdiff_t half = count_below(threshold * threshold) / 2;
   if (half == 0) return threshold;
-  // The median by bisection of its logarithm: passes without branches are faster than sorting.
+  // Median by bisection of its logarithm; passes without branches are faster than sorting.
   constexpr double kPrecision = 1.002;
   double low = std::min(smallest / kSigmasPerMedianDeviation, threshold);
   double high = threshold;

@@ -8,7 +8,7 @@
 
 namespace rotslam {
 
-/// An epipolar model at a minimum of the robust Sampson distances, and the normal equations there.
+/// An epipolar model at a minimum of the robust Sampson distances, with its normal equations.
 struct EpipolarFit {
   EpipolarModel model;
   EpipolarNormal normal;
@@ -19,14 +19,14 @@ struct EpipolarFit {
 /// its cost.
 /// @param loss            scale of the loss, rad.
 /// @param max_iterations  steps tried, rejected ones among them.
-/// @param tolerance       stop when a step is about to lower the cost by less than this part of it.
+/// @param tolerance  stop when the predicted decrease of the cost is below this share of it.
 EpipolarFit RefineEpipolar(const PairArrays& pairs,
                            const EpipolarModel& start,
                            double loss,
                            int max_iterations,
                            double tolerance);
 
-/// A rotation at a minimum of the robust differences R f_i - f_j, and the Hessian there.
+/// A rotation at a minimum of the robust differences R f_i - f_j, with its Hessian.
 struct RotationFit {
   Rotation j_from_i;
   Eigen::Matrix3d H;
@@ -39,7 +39,7 @@ RotationFit RefineRotation(const PairArrays& pairs,
                            double loss,
                            int max_iterations);
 
-/// Directions in which the translation may point, the rotation given, as columns, the likeliest
+/// Candidates for the direction of translation with a given rotation, as columns, the likeliest
 /// first: principal axes of the normals of the epipolar planes.
 Eigen::Matrix3d TranslationAxes(const PairArrays& pairs, const Rotation& j_from_i);
 

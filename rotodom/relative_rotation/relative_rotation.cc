@@ -14,9 +14,8 @@
 namespace rotslam {
 namespace {
 
-// Which rotation to believe is another question than whether there is a baseline: where both models
-// fit, as on the narrow strip that views after a long turn share, a small baseline would go into
-// the rotation.
+// Selects the rotation independently of the test for a baseline. Where both models fit, as with a
+// narrow overlap after a large rotation, the rotation-only model would absorb a small baseline.
 // @param squared_distances, squared_flows  of all pairs under either model, rad^2.
 bool RotationExplains(const std::vector<double>& squared_distances,
                       const std::vector<double>& squared_flows,
@@ -24,7 +23,7 @@ bool RotationExplains(const std::vector<double>& squared_distances,
   return RotationCriterion(squared_flows, noise) < EpipolarCriterion(squared_distances, noise);
 }
 
-// Whether the members' matches show a baseline.
+// Tests whether the members' matches show a baseline.
 BaselineEvidence EvidenceOf(const PairArrays& members,
                             const std::vector<int>& member_indices,
                             std::span<const KeypointCovariances> covariances,
@@ -40,9 +39,9 @@ BaselineEvidence EvidenceOf(const PairArrays& members,
       members, of_members, hypotheses, options.shared_error_px, focal_px, options.baseline);
 }
 
-// Of the matches that agree with the epipolar model, a rotation that is to replace it explains this
-// share. A test between two models does not see that both are wrong.
-constexpr double kSmallestTurnedShare = 0.7;
+// Share of the epipolar model's inliers that a rotation must explain to replace it. A test between
+// two models does not detect that both are wrong.
+constexpr double kMinShareByRotation = 0.7;
 
 int NumBelow(const std::vector<double>& squares, double limit) {
   return static_cast<int>(std::count_if(
@@ -56,7 +55,7 @@ Eigen::Vector3d WithForwardSign(const PairArrays& pairs,
   const Eigen::Matrix3d R_j_i = model.j_from_i.Matrix();
   int votes = 0;
   for (const int index : inliers) {
-    // x_j = depth_i g + t in front means that moving from g to f turns towards t.
+    // With x_j = depth_i g + t in front of the camera, the bearing moves from g towards t.
     const Eigen::Vector3d g = R_j_i * pairs.BearingI(index);
     const Eigen::Vector3d turn = g.cross(pairs.BearingJ(index));
     votes += turn.dot(g.cross(model.direction)) > 0.0 ? 1 : -1;
@@ -71,7 +70,7 @@ void CheckPairs(const std::vector<BearingPair>& pairs) {
     }
     if (!pair.noise) continue;
     const Eigen::Matrix2d& C = pair.noise->covariance_j;
-    // Sums of products are symmetric and positive up to rounding only.
+    // Computed covariances are symmetric and positive up to rounding only.
     const double rounding = 1e-9 * C.trace() * C.trace();
     const double skew = C(0, 1) - C(1, 0);
     const bool valid = C.allFinite() && C(0, 0) >= 0.0 && C(1, 1) >= 0.0 &&
@@ -83,7 +82,7 @@ void CheckPairs(const std::vector<BearingPair>& pairs) {
   }
 }
 
-// The matches fix the rotation: no direction in which the equations know nothing but rounding.
+// Whether the matches determine the rotation: no eigenvalue is at the level of rounding.
 bool IsFixed(const Eigen::Matrix3d& information) {
   const Eigen::Vector3d eigenvalues =
       Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d>(information, Eigen::EigenvaluesOnly)
@@ -91,7 +90,7 @@ bool IsFixed(const Eigen::Matrix3d& information) {
   return eigenvalues[0] > 1e-10 * eigenvalues[2];
 }
 
-// Refines the model on its members, tests the baseline, and chooses the rotation to believe.
+// Refines the model on its members, tests the baseline, and selects the rotation.
 std::optional<RelativeRotationEstimate> EstimateFrom(
     const PairArrays& all,
     const Consensus& consensus,
@@ -136,17 +135,17 @@ std::optional<RelativeRotationEstimate> EstimateFrom(
   const int num_turned =
       NumBelow(SquaredFlows(arrays, rotation.j_from_i), 2.0 * threshold * threshold);
   estimate.rotation_only =
-      !estimate.baseline.ShowsBaseline() && num_turned >= kSmallestTurnedShare * num_inliers;
-  // The rotation's own block bounds what either model can know of it.
+      !estimate.baseline.ShowsBaseline() && num_turned >= kMinShareByRotation * num_inliers;
+  // The block of the rotation bounds the information of both models.
   if (!IsFixed(rotation.H)) return std::nullopt;
-  const bool believes_rotation =
+  const bool selects_rotation =
       RotationExplains(squared_distances,
                        SquaredFlows(arrays, rotation.j_from_i),
                        std::hypot(noise, options.shared_error_px / focal_px));
-  if (believes_rotation) {
+  if (selects_rotation) {
     estimate.j_from_i = rotation.j_from_i;
-    // A baseline that shows no more flow than the shared error goes into the rotation; on rendered
-    // gimbals, half of it did.
+    // A baseline whose flow is below the shared error is absorbed by the rotation; on rendered
+    // gimbals by half.
     const double shared_error = 0.5 * options.shared_error_px / focal_px;
     estimate.covariance = 2.0 * noise * noise * rotation.H.inverse() +
                           shared_error * shared_error * Eigen::Matrix3d::Identity();
@@ -191,7 +190,7 @@ std::vector<RelativeRotationEstimate> EstimateRotationHypotheses(
   for (const Consensus& consensus :
        FindConsensus(all, predicted_j_from_i, focal_px, options, seed)) {
     auto estimate = EstimateFrom(all, consensus, focal_px, options, covariances);
-    // What the best one does not bear, the rest do not replace.
+    // Without an estimate from the best hypothesis the others are not used.
     if (!estimate) break;
     estimates.push_back(*std::move(estimate));
   }

@@ -12,50 +12,49 @@
 
 namespace rotslam {
 
-/// What two views' matches say about the rotation between them.
+/// The relative rotation of two views estimated from their matches.
 struct RelativeRotationEstimate {
   Rotation j_from_i;
   Eigen::Matrix3d covariance;  // of delta in Exp(delta) * j_from_i, rad^2
-  // x_j = R x_i + s t, s > 0; unit, or zero when rotation_only or j_from_i is that of no baseline.
+  // x_j = R x_i + s t, s > 0; unit, or zero when rotation_only or when j_from_i is that of the
+  // model without a baseline.
   Eigen::Vector3d translation_direction;
-  // Of the direction's small changes, rad^2: rank two, zero along the direction; zero when
+  // Covariance of the direction, rad^2: rank two, zero along the direction; zero when
   // rotation_only.
   Eigen::Matrix3d translation_covariance;
-  bool rotation_only = false;  // rotation alone explains the matches: no evidence of a baseline
-  BaselineEvidence baseline;   // what that was decided by
+  bool rotation_only = false;  // there is no evidence of a baseline
+  BaselineEvidence baseline;   // the test that decided this
   double noise_px = 0.0;       // robust standard deviation of the inliers' Sampson distance
   double parallax_px = 0.0;  // root mean square of the inliers' flow that rotation does not explain
   std::vector<int> inliers;  // positions in `pairs`, ascending
   int num_samples = 0;
-  // What its score lacks to that of the best hypothesis, nats by inlier of that one.
+  // Difference of its score from that of the best hypothesis, nats per inlier of the latter.
   double excess = 0.0;
 };
 
-/// Estimates the rotation between two views from matched bearings, whatever the baseline, zero
-/// included.
+/// Estimates the rotation between two views from matched bearings, for any baseline including zero.
 ///
-/// Hypotheses come from descents on part of the matches and from small samples and are scored by
-/// the truncated Sampson distance, which stays valid as the baseline vanishes (consensus.h), points
-/// behind the cameras being none: a plane alone has a second motion that fits all its lines. The
-/// best is refined on all matches but those that only chance makes agree: once as (rotation,
-/// translation direction) on the Sampson distance and once as rotation alone, both with a
-/// redescending loss. TestBaseline decides whether there is a baseline, Torr's geometric
-/// information criterion which of the two rotations is the better one; they ask different questions
-/// and differ where the baseline is at the limit. Matches that carry a MatchNoise are weighted by
-/// it throughout.
-/// @param pairs                matched bearings, wrong ones among them; a bearing that is not
-/// finite
-///                             or a covariance that is none throws std::invalid_argument.
+/// Hypotheses come from descents on part of the matches and from small samples. They are scored by
+/// the truncated Sampson distance, which stays valid as the baseline vanishes (consensus.h); points
+/// behind the cameras count as outliers, since a plane has a second motion that fits all epipolar
+/// lines. The best hypothesis is refined on all matches except chance inliers: once as rotation and
+/// translation direction on the Sampson distance and once as rotation alone, both with a
+/// redescending loss. TestBaseline decides whether there is a baseline, and Torr's geometric
+/// information criterion selects the rotation; the two may disagree for baselines at the limit of
+/// detection. Matches with a MatchNoise are weighted by it throughout.
+/// @param pairs  matched bearings with outliers. A bearing that is not finite or an invalid
+///               covariance throws std::invalid_argument.
 /// @param predicted_j_from_i   where to start; may be far off.
 /// @param focal_px             pixels per radian, for the thresholds.
-/// @param seed                 same seed, same answer.
-/// @param covariances          one per pair, or none; for the test of the baseline only.
-/// @return  nullopt when fewer than options.min_inliers matches agree, or do not fix the rotation.
-/// Error:   medians of 80 scenes, 1,000 matches, 0.5 px at f = 700, 0 / 25 / 50 % wrong: 0.005 /
+/// @param seed  equal seeds give equal results.
+/// @param covariances  one per pair, or none; used by the test of the baseline only.
+/// @return  nullopt when fewer than options.min_inliers matches agree or they do not determine the
+///          rotation.
+/// Error:   medians of 80 scenes, 1,000 matches, 0.5 px at f = 700, 0 / 25 / 50 % outliers: 0.005 /
 ///          0.006 / 0.006 deg without baseline, 0.020 / 0.030 / 0.035 at 1 % of the depth, 0.018 /
-///          0.027 / 0.032 at 10 %; mean squared Mahalanobis distance / 3 of the rotation 0.8
-///          to 2.2. A baseline too small for the evidence (0.3 % at 1 px) goes into the rotation
-///          and not into its covariance.
+///          0.027 / 0.032 at 10 %; mean squared Mahalanobis distance / 3 of the rotation 0.8 to
+///          2.2. An undetected baseline (0.3 % at 1 px) biases the rotation, and the covariance
+///          does not include that.
 /// Cost:    0.3 ms for 1,000 matches with AVX2, 1.2 ms when samples must be drawn to the end.
 /// Source:  Torr, Geometric motion segmentation and model selection, 1998 (criterion); Muhle et
 /// al., The Probabilistic Normal Epipolar Constraint, CVPR 2022 (weights).
@@ -67,10 +66,11 @@ std::optional<RelativeRotationEstimate> EstimateRelativeRotation(
     std::uint64_t seed,
     std::span<const KeypointCovariances> covariances = {});
 
-/// The same, and behind it a second estimate where the matches allow another rotation almost as
-/// well, mostly the other motion that shows a plane in the same places. Two views cannot tell which
-/// of them is right; a third one can (ChooseConsistent).
-/// @return  empty where EstimateRelativeRotation has none; ascending in `excess`, at most two.
+/// The same, followed by a second estimate where the matches allow another rotation almost as well,
+/// in most cases the second solution for a plane. Two views cannot decide between them; a third one
+/// can (ChooseConsistent).
+/// @return  empty where EstimateRelativeRotation returns nullopt; ascending in `excess`, at most
+///          two.
 std::vector<RelativeRotationEstimate> EstimateRotationHypotheses(
     const std::vector<BearingPair>& pairs,
     const Rotation& predicted_j_from_i,

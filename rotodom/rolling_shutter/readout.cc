@@ -18,12 +18,12 @@
 namespace rotslam {
 namespace {
 
-constexpr std::size_t kMinPairs = 10;
-// No sensor that takes sequences is slower.
+constexpr std::size_t kMinPairs = 10;  // one for each block of the jackknife
+// Upper bound of the readout, s: sensors of video cameras are faster.
 constexpr double kLongestReadout = 0.05;
-// First readouts that are tried, in each direction.
+// Steps of the first search in each direction.
 constexpr int kCoarseSteps = 12;
-// Matches that agree scatter by no less, rad * focal length.
+// Lower bound of the noise of matches, px.
 constexpr double kLeastNoisePx = 0.05;
 
 ReadoutStart StartOf(const Readout& readout) {
@@ -48,14 +48,14 @@ struct ReadoutCandidate {
   std::vector<PairModels> models;
 };
 
-// Readouts side by side, one step apart, with the criterion of each pair.
+// Criterion of each pair for readouts at equal steps.
 struct ScoreTable {
   double first_s = 0.0;
   double step_s = 0.0;
   std::vector<std::vector<double>> scores;
 
-  // Where a parabola through the best one and its neighbours is lowest, without some of the pairs;
-  // where the best one is at either end, that.
+  // Minimum of the parabola through the best readout and its neighbours, without pairs [from, to);
+  // at either end of the table the best readout itself.
   double Lowest(std::size_t from, std::size_t to) const {
     std::vector<double> sums;
     for (const std::vector<double>& of_pairs : scores) {
@@ -81,7 +81,7 @@ struct ScoreTable {
   }
 };
 
-// Standard deviation of the lowest place, by leaving out one stretch of time after the other.
+// Jackknife standard deviation of the minimum: blocks of consecutive pairs are left out in turn.
 double JackknifeSigma(const ScoreTable& table) {
   constexpr std::size_t kBlocks = 10;
   const std::size_t num_pairs = table.scores.front().size();
@@ -95,7 +95,7 @@ double JackknifeSigma(const ScoreTable& table) {
   return std::sqrt(squares * (kBlocks - 1) / kBlocks);
 }
 
-// Searches all readouts for the one that explains the pairs best.
+// Searches the readout that explains the pairs best.
 class ReadoutSearch {
  public:
   ReadoutSearch(std::vector<ViewPair> pairs,
@@ -116,13 +116,13 @@ class ReadoutSearch {
     ReadoutCandidate at;
     ScoreTable around;
 
-    double lowest = 0.0;  // the sum there
+    double lowest = 0.0;  // sum of the criteria
   };
 
-  /// nullopt where there is none but at the ends.
+  /// nullopt where the only minima are at the ends.
   std::optional<Minimum> Search() const {
-    // Of pairs with and without a translation each kind may have a minimum of its own; which is
-    // lower shows only close by (of 20 ms that a turning gimbal had, 10 came first on this grid).
+    // Pairs with and without a translation may each cause a minimum. The finer search decides
+    // between them, because the coarse grid can rank them wrongly.
     constexpr std::size_t kMaxMinima = 3;
     std::vector<std::pair<double, ReadoutCandidate>> minima;
     for (const int axis : {1, 0}) AddMinimaAlong(axis, minima);
@@ -138,7 +138,7 @@ class ReadoutSearch {
     return best;
   }
 
-  /// The gain of a candidate over a global shutter, in standard errors.
+  /// Gain of a candidate over a global shutter, in standard errors.
   double GainSigmas(ReadoutCandidate candidate) const {
     ReadoutCandidate global = global_;
     const std::vector<double> without = Score(global, noise_);
@@ -156,7 +156,7 @@ class ReadoutSearch {
   double rate_difference() const { return rate_difference_; }  // the median pair's, rad/s
 
  private:
-  // The pairs' models with a global shutter, and the noise of their matches.
+  // Fits the models of all pairs for a global shutter, and estimates the noise of their matches.
   void FindModels(double focal_px, const RelativeRotationOptions& options) {
     global_.models.resize(pairs_.size());
     std::vector<double> noises_px(pairs_.size(), options.inlier_px);
@@ -176,7 +176,7 @@ class ReadoutSearch {
     noise_ = std::max(Median(std::move(noises_px)), kLeastNoisePx) / focal_px;
   }
 
-  // The criterion of each pair; refines the candidate's models.
+  // Computes the criterion of each pair and refines the candidate's models.
   std::vector<double> Score(ReadoutCandidate& candidate, double noise) const {
     constexpr double kLossSigmas = 3.0;
     constexpr int kIterations = 10;
@@ -194,13 +194,14 @@ class ReadoutSearch {
     return scores;
   }
 
-  // With a tolerance for what lies between two steps.
+  // Noise that includes the error of a readout between two steps.
   double NoiseFor(double step_s) const {
     constexpr double kShareOfStep = 0.15;
     return std::max(noise_, kShareOfStep * rate_difference_ * step_s);
   }
 
-  // Of readouts in both directions; from each one the models go on to the next.
+  // Adds the minima along one axis for readouts of both signs. The models of one readout are the
+  // start of the next.
   void AddMinimaAlong(int axis, std::vector<std::pair<double, ReadoutCandidate>>& minima) const {
     std::vector<ReadoutCandidate> line(2 * kCoarseSteps + 1);
     std::vector<double> sums(line.size());
@@ -253,12 +254,13 @@ class ReadoutSearch {
 }  // namespace
 
 bool ReadoutEstimate::IsRolling() const {
-  // No sensor is faster that is not global. On footage of the latter up to 4.3 standard deviations
-  // were found, up to 7 where the shear was less than 1.8 times the noise.
+  // Thresholds: the fastest rolling shutter, s; standard deviations of the readout, of which
+  // sequences with a global shutter reach up to 4.3; and of the gain.
   constexpr double kShortest = 1e-3;
   constexpr double kSigmas = 5.0;
   constexpr double kGainSigmas = 2.0;
-  // What is smaller is as easily a lens that is not quite known, and not worth knowing.
+  // Smallest shear, as a multiple of the noise. A smaller one may be caused by the lens
+  // calibration, and has no effect on the results.
   constexpr double kLeastShear = 2.5;
   return readout_s > std::max(kShortest, kSigmas * sigma_s) && gain_sigmas > kGainSigmas &&
          shear_px > kLeastShear * noise_px;
@@ -280,7 +282,8 @@ std::optional<ReadoutEstimate> EstimateReadout(const Camera& camera,
   const double period_s = MedianPeriod(frames);
   const double longest_s = std::min(period_s, kLongestReadout);
   const double focal_px = camera.MeanFocal();
-  std::vector<ViewPair> pairs = PairsThatTell(camera, frames, graph, cam_from_world, longest_s);
+  std::vector<ViewPair> pairs =
+      SelectReadoutPairs(camera, frames, graph, cam_from_world, longest_s);
   if (pairs.size() < kMinPairs) return std::nullopt;
   const ReadoutSearch search(std::move(pairs), longest_s, focal_px, options, num_threads);
   const auto best = search.Search();

@@ -13,8 +13,8 @@
 namespace rotslam {
 namespace {
 
-// Pairs of views that are asked, less than twice as many where all cannot be thinned evenly, and
-// matches of each.
+// Number of pairs of views (up to twice as many where they cannot be thinned evenly), and numbers
+// of matches per pair.
 constexpr std::size_t kPairs = 300;
 constexpr std::size_t kMaxMatches = 150;
 constexpr std::size_t kMinMatches = 50;
@@ -23,8 +23,10 @@ struct TimedSight {
   Eigen::Vector3d unturned;
 };
 
-TimedSight Unturn(const FrameSight& sight, const AngularMotion& motion, const Readout& readout) {
-  const double after_s = sight.late_s + readout.seconds * sight.place[readout.axis];
+TimedSight Unturn(const FrameObservation& sight,
+                  const AngularMotion& motion,
+                  const Readout& readout) {
+  const double after_s = sight.time_s + readout.seconds * sight.place[readout.axis];
   return {after_s, motion.ToMidFrame(after_s, sight.bearing)};
 }
 
@@ -40,10 +42,10 @@ Eigen::Vector3d MidFrameBearing(const SeenPoint& point,
 }
 
 using Frames = std::map<FrameId, SeenPoints>;
-using Motions = std::map<FrameId, BelievedMotion>;
+using Motions = std::map<FrameId, MotionEstimate>;
 
-// Of the frames that have neighbours on both sides, in time, too.
-// @param readout_s  the longest that is sought.
+// Motions of the frames with neighbours on both sides that are also near in time.
+// @param readout_s  upper bound of the readout, s.
 Motions MotionsOf(const Frames& frames,
                   const RotationMap& cam_from_world,
                   double period_s,
@@ -53,22 +55,22 @@ Motions MotionsOf(const Frames& frames,
   for (auto frame = std::next(frames.begin()); std::next(frame) != frames.end(); ++frame) {
     const double around_s = time_s(std::next(frame)->first) - time_s(std::prev(frame)->first);
     if (around_s > 3.0 * period_s) continue;
-    motions[frame->first] = BelievedMotionAt(frame->first, cam_from_world, time_s, readout_s);
+    motions[frame->first] = EstimateMotionAt(frame->first, cam_from_world, time_s, readout_s);
   }
   return motions;
 }
 
-// Between the two views of an edge, rad/s.
+// Difference of the angular velocities of an edge's views, rad/s.
 double RateDifference(const RelativeRotation& edge, const Motions& motions) {
   const Eigen::Vector3d rate_i = motions.at(edge.i).motion.coefficients.col(0);
   const Eigen::Vector3d rate_j = motions.at(edge.j).motion.coefficients.col(0);
   return (rate_j - edge.j_from_i * rate_i).norm();
 }
 
-// Edges that tell most of a readout, the best first.
-std::vector<RelativeRotation> MostTellingEdges(const ViewGraph& graph,
-                                               const Motions& motions,
-                                               double focal_px) {
+// Edges that are most informative about the readout, the best first.
+std::vector<RelativeRotation> MostInformativeEdges(const ViewGraph& graph,
+                                                   const Motions& motions,
+                                                   double focal_px) {
   struct Ranked {
     double difference = 0.0;
     double information = 0.0;
@@ -84,8 +86,8 @@ std::vector<RelativeRotation> MostTellingEdges(const ViewGraph& graph,
     ranked.push_back({difference, contrast * contrast * edge.num_inliers, &edge});
   }
   if (ranked.empty()) return {};
-  // Views that turn at the same rate tell of other errors: of a gimbal's fast and steady turn,
-  // tracked as if its shutter were global, half the readout.
+  // Edges between views at equal rates measure other errors than the readout. The threshold is
+  // relative to the rate differences among the largest tenth.
   constexpr double kShareOfLarge = 0.2;
   const auto large = ranked.begin() + static_cast<std::ptrdiff_t>(ranked.size() * 9 / 10);
   std::nth_element(ranked.begin(), large, ranked.end(), [](const Ranked& a, const Ranked& b) {
@@ -97,7 +99,7 @@ std::vector<RelativeRotation> MostTellingEdges(const ViewGraph& graph,
     return std::tuple(b.information, a.edge->i, a.edge->j) <
            std::tuple(a.information, b.edge->i, b.edge->j);
   });
-  // Pairs that share a frame say much the same: some of many.
+  // Pairs with a common frame are redundant: every fourth of the best ones is used.
   constexpr std::size_t kOfWhich = 4;
   ranked.resize(std::min(ranked.size(), kOfWhich * kPairs));
   const std::size_t stride = std::max<std::size_t>(1, ranked.size() / kPairs);
@@ -106,7 +108,7 @@ std::vector<RelativeRotation> MostTellingEdges(const ViewGraph& graph,
   return edges;
 }
 
-// Makes the pairs of views from the frames' points.
+// Builds the pairs of views from the points of the frames.
 class PairMaker {
  public:
   PairMaker(const Camera& camera, const Frames& frames, const Motions& motions)
@@ -136,7 +138,7 @@ class PairMaker {
   }
 
  private:
-  // Evenly, where there are too many.
+  // Common tracks, thinned evenly where there are too many.
   std::vector<TrackId> CommonTracks(const RelativeRotation& edge) const {
     const SeenPoints& i = frames_.at(edge.i);
     const SeenPoints& j = frames_.at(edge.j);
@@ -152,7 +154,9 @@ class PairMaker {
     return some;
   }
 
-  std::optional<FrameSight> SightOf(TrackId track, const SeenPoints& frame, double mid_s) const {
+  std::optional<FrameObservation> SightOf(TrackId track,
+                                          const SeenPoints& frame,
+                                          double mid_s) const {
     const int index = FindTrack(frame.tracks, track);
     if (index < 0) return std::nullopt;
     const Eigen::Vector2d& keypoint_px = frame.keypoints_px[index];
@@ -160,7 +164,7 @@ class PairMaker {
     if (!bearing) return std::nullopt;
     const Eigen::Vector2d place(by_columns_.ExposureTime(keypoint_px),
                                 by_rows_.ExposureTime(keypoint_px));
-    return FrameSight{frame.timestamp_s - mid_s, place, *bearing};
+    return FrameObservation{frame.timestamp_s - mid_s, place, *bearing};
   }
 
   std::optional<SeenPoint> PointOf(TrackId track, FrameId frame) const {
@@ -201,15 +205,15 @@ double MedianPeriod(const Frames& frames) {
   return Median(std::move(periods));
 }
 
-std::vector<ViewPair> PairsThatTell(const Camera& camera,
-                                    const std::map<FrameId, SeenPoints>& frames,
-                                    const ViewGraph& graph,
-                                    const RotationMap& cam_from_world,
-                                    double longest_s) {
+std::vector<ViewPair> SelectReadoutPairs(const Camera& camera,
+                                         const std::map<FrameId, SeenPoints>& frames,
+                                         const ViewGraph& graph,
+                                         const RotationMap& cam_from_world,
+                                         double longest_s) {
   const Motions motions = MotionsOf(frames, cam_from_world, MedianPeriod(frames), longest_s);
   const PairMaker maker(camera, frames, motions);
   std::vector<ViewPair> pairs;
-  for (const RelativeRotation& edge : MostTellingEdges(graph, motions, camera.MeanFocal())) {
+  for (const RelativeRotation& edge : MostInformativeEdges(graph, motions, camera.MeanFocal())) {
     ViewPair pair = maker.Make(edge);
     if (pair.in_i.size() >= kMinMatches) pairs.push_back(std::move(pair));
   }

@@ -16,27 +16,27 @@
 
 namespace rotslam {
 
-/// A signed readout: along columns (0) or rows (1) of the image, from its left or top where it is
-/// positive.
+/// A signed readout along columns (0) or rows (1) of the image. A positive one starts at the left
+/// or top.
 struct Readout {
   int axis = 1;
   double seconds = 0.0;
 };
 
-/// Where a frame shows a point.
-struct FrameSight {
-  double late_s = 0.0;    // the middle of that frame
-  Eigen::Vector2d place;  // from the middle of the image, in its widths and heights
+/// Observation of a point in a frame.
+struct FrameObservation {
+  double time_s = 0.0;    // mid-frame time of that frame, relative to the frame at hand
+  Eigen::Vector2d place;  // from the image centre, in units of width and height
   Eigen::Vector3d bearing;
 };
 
-/// A point in a frame, and in the frames before and behind where both show it.
+/// Observations of a point in a frame, and in the frames before and after where both see it.
 struct SeenPoint {
-  FrameSight here;
-  std::optional<std::array<FrameSight, 2>> around;
+  FrameObservation here;
+  std::optional<std::array<FrameObservation, 2>> around;
 };
 
-/// Two views, and the points that both see, in the same order.
+/// Two views and their common points, in the same order.
 struct ViewPair {
   FrameId i;
   FrameId j;
@@ -45,24 +45,24 @@ struct ViewPair {
   std::vector<SeenPoint> in_i;
   std::vector<SeenPoint> in_j;
   Rotation predicted_j_from_i;
-  double rate_difference = 0.0;  // rad/s: of a readout, it shears so much of every second
+  double rate_difference = 0.0;  // rad/s: shear per second of readout
 
-  /// Of the points in the middle of their frames, where the camera has that readout.
+  /// Bearings of the points moved to mid-frame, for a camera with that readout.
   std::vector<BearingPair> BearingsFor(const Readout& readout) const;
 };
 
-/// Time between two frames, the median; at least two frames.
+/// Median time between two frames; there must be at least two.
 double MedianPeriod(const std::map<FrameId, SeenPoints>& frames);
 
-/// Pairs of views that tell most of a readout, 300 to 600 where there are as many, in order of
-/// time: they turn at different rates, their matches scatter little, their motion is known. Points
-/// that both and, where they can, the frames around see; at least 50.
-/// @param frames      as EstimateReadout takes them, like the rest.
-/// @param longest_s   the longest readout that is sought.
-std::vector<ViewPair> PairsThatTell(const Camera& camera,
-                                    const std::map<FrameId, SeenPoints>& frames,
-                                    const ViewGraph& graph,
-                                    const RotationMap& cam_from_world,
-                                    double longest_s);
+/// Selects the pairs of views that are most informative about the readout, 300 to 600 where there
+/// are as many, in order of time: different rotation rates, small noise of the matches, known
+/// motion, at least 50 common points.
+/// @param frames  this and the following arguments are those of EstimateReadout.
+/// @param longest_s  upper bound of the readout, s.
+std::vector<ViewPair> SelectReadoutPairs(const Camera& camera,
+                                         const std::map<FrameId, SeenPoints>& frames,
+                                         const ViewGraph& graph,
+                                         const RotationMap& cam_from_world,
+                                         double longest_s);
 
 }  // namespace rotslam

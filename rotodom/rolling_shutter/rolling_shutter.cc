@@ -43,7 +43,7 @@ Rotation AngularMotion::After(double seconds) const {
 }
 
 Eigen::Vector3d AngularMotion::ToMidFrame(double seconds, const Eigen::Vector3d& vector) const {
-  // Rodrigues' formula, its series where the angle leaves nothing to divide by.
+  // Rodrigues' formula, as a series for small angles.
   const Eigen::Vector3d turn = RotationVector(*this, seconds);
   const double squared_angle = turn.squaredNorm();
   double sine_share = 1.0 - squared_angle / 6.0;
@@ -89,18 +89,18 @@ AngularMotion MotionAt(FrameId frame,
   return MotionThrough(timed(here), others);
 }
 
-BelievedMotion BelievedMotionAt(FrameId frame,
+MotionEstimate EstimateMotionAt(FrameId frame,
                                 const RotationMap& cam_from_world,
                                 const std::function<double(FrameId)>& time_s,
                                 double readout_s) {
   constexpr int kOthers = 2;
-  BelievedMotion believed{MotionAt(frame, cam_from_world, time_s, kOthers)};
+  MotionEstimate estimate{MotionAt(frame, cam_from_world, time_s, kOthers)};
   const AngularMotion finer = MotionAt(frame, cam_from_world, time_s, kOthers + 1);
-  for (const double late_s : {-0.5 * readout_s, 0.5 * readout_s}) {
-    const Rotation between = believed.motion.After(late_s) * finer.After(late_s).Inverse();
-    believed.error_rad = std::max(believed.error_rad, between.Angle());
+  for (const double after_s : {-0.5 * readout_s, 0.5 * readout_s}) {
+    const Rotation between = estimate.motion.After(after_s) * finer.After(after_s).Inverse();
+    estimate.error_rad = std::max(estimate.error_rad, between.Angle());
   }
-  return believed;
+  return estimate;
 }
 
 Eigen::Vector3d BearingInMidFrame(const AngularMotion& motion, std::span<const TimedBearing> seen) {
@@ -120,7 +120,7 @@ void CorrectRollingShutter(const Camera& camera,
                            const AngularMotion& motion,
                            std::span<const View* const> others,
                            View& view) {
-  // Of what is closer in time the noise tells more than the motion.
+  // Observations closer in time differ by noise rather than by motion.
   const double least_distance_s = 0.5 * camera.readout_s;
   std::vector<TimedBearing> seen;
   const auto add = [&](const View& from, int index) {

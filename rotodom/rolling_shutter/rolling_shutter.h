@@ -15,42 +15,42 @@ namespace rotslam {
 /// Column k belongs to the (k+1)th power of a time in seconds.
 using PowerCoefficients = Eigen::Matrix<double, 3, 4>;
 
-/// A vector that was zero at time 0, at another time.
+/// A value at some time of a vector that is zero at time 0.
 struct TimedOffset {
   double after_s = 0.0;
   Eigen::Vector3d offset;
 };
 
-/// The polynomial of lowest degree without constant part through `offsets`.
-/// @param offsets  at most four, at different times, none of them 0; without any it is 0.
+/// The polynomial of lowest degree without constant term through `offsets`.
+/// @param offsets  at most four, at different times other than 0; the result is 0 for none.
 PowerCoefficients PolynomialThrough(std::span<const TimedOffset> offsets);
 
-/// How a camera turns while the rows of a frame are exposed.
+/// Rotation of a camera during the readout of a frame.
 struct AngularMotion {
-  // Of the rotation vector since mid-frame, rad in camera axes.
+  // Rotation vector since mid-frame as a polynomial of time, rad in camera axes.
   PowerCoefficients coefficients = PowerCoefficients::Zero();
 
-  /// The camera `seconds` after mid-frame, from the camera in mid-frame.
+  /// Rotation from the camera at mid-frame to that `seconds` later.
   Rotation After(double seconds) const;
-  /// A vector in the camera `seconds` after mid-frame, in the camera in mid-frame: the inverse of
-  /// After(), three times as fast for one vector.
+  /// Transforms a vector from the camera `seconds` after mid-frame to that at mid-frame: the
+  /// inverse of After(), three times as fast for one vector.
   Eigen::Vector3d ToMidFrame(double seconds, const Eigen::Vector3d& vector) const;
 };
 
-/// An orientation and when it was taken.
+/// An orientation at a time.
 struct TimedOrientation {
   double time_s = 0.0;
   Rotation cam_from_world;
 };
 
-/// The smoothest motion through the orientations of a frame and of others: rotation vectors from
-/// the frame's are a polynomial of time.
+/// Motion through the orientations of a frame and of others: the rotation vector relative to the
+/// frame is the polynomial of time of lowest degree.
 /// @param others  at most four, at different times; none: no motion.
 AngularMotion MotionThrough(const TimedOrientation& frame,
                             std::span<const TimedOrientation> others);
 
-/// The same by the frames next to it, in turn behind and before; where one side has no more, by
-/// those of the other.
+/// The same with the nearest other frames, alternating between before and after; where one side has
+/// no more, with those of the other side.
 /// @param time_s      of each frame; ascending.
 /// @param num_others  at most four.
 AngularMotion MotionAt(FrameId frame,
@@ -58,49 +58,47 @@ AngularMotion MotionAt(FrameId frame,
                        const std::function<double(FrameId)>& time_s,
                        int num_others);
 
-/// A motion, and how far it may be off while the rows of a frame are exposed, radians.
-struct BelievedMotion {
+/// A motion and its error during the readout of a frame, rad.
+struct MotionEstimate {
   AngularMotion motion;
   double error_rad = 0.0;
 
-  /// The same of most rows, which are nearer to the middle than the ones that are off by that.
+  /// Error of most rows, which are nearer to mid-frame than the rows with `error_rad`.
   double TypicalErrorRad() const { return 0.5 * error_rad; }
 };
 
-/// MotionAt through two other frames; what a third would make of it tells the error. Going through
-/// that one, too, measured worse where tracking is noisy (7-Scenes kitchen, RPE_1 0.231 instead of
-/// 0.206 deg).
-BelievedMotion BelievedMotionAt(FrameId frame,
+/// MotionAt with two other frames. The error is the difference from the motion with a third one;
+/// using three for the motion itself is less accurate where tracking is noisy.
+MotionEstimate EstimateMotionAt(FrameId frame,
                                 const RotationMap& cam_from_world,
                                 const std::function<double(FrameId)>& time_s,
                                 double readout_s);
 
-/// A bearing in the camera as it stood then, seconds after the middle of a frame.
+/// A bearing in the camera frame at that time, in seconds after mid-frame.
 struct TimedBearing {
   double after_s = 0.0;
   Eigen::Vector3d bearing;
 };
 
-/// What would have been seen of a point in the middle of a frame, in the camera as it stood then.
-/// The motion is taken out of what was seen of it around; what is left, its parallax and what is
-/// wrong with the motion, is a polynomial of time.
-/// @param seen  at least one; at different times.
+/// Bearing of a point at mid-frame, in the camera at mid-frame. The known rotation is removed from
+/// the observations; the remainder, parallax and errors of the rotation, is a polynomial of time.
+/// @param seen  observations at different times, at least one.
 /// @return  unit.
-/// Error:   with bearings from the frame and its two neighbours none to second order in time, even
-///          where the motion is wrong.
+/// Error:   none to second order in time with bearings from the frame and its two neighbours, even
+///          where the rotation is wrong.
 Eigen::Vector3d BearingInMidFrame(const AngularMotion& motion, std::span<const TimedBearing> seen);
 
-/// Sets the bearings of a view to what they would be had all its rows been exposed in the middle of
-/// the frame; its keypoints stay where they are. Those without a bearing keep the one they have.
-/// @param others  that may show the same points; of the same camera. What they saw within half a
-///                readout of the view, or of each other, does not count.
+/// Sets the bearings of a view to those of a global-shutter image taken at mid-frame. Its keypoints
+/// are not changed, and keypoints without a bearing in the model keep the one they have.
+/// @param others  views of the same camera that may see the same points. Observations within half a
+///                readout of the view, or of each other, are ignored.
 void CorrectRollingShutter(const Camera& camera,
                            const AngularMotion& motion,
                            std::span<const View* const> others,
                            View& view);
 
-/// Moves corners, keypoints and bearings, to where they would be had all rows been exposed in the
-/// middle of the frame; those without a bearing stay.
+/// Moves corners (keypoints and bearings) to their positions in a global-shutter image taken at
+/// mid-frame; those without a bearing are not moved.
 void MoveToMidFrame(const Camera& camera, const AngularMotion& motion, Features& corners);
 
 }  // namespace rotslam

@@ -28,16 +28,16 @@ struct PosedView {
   std::vector<int> nearest;  // other views, by the distance of their centres
 };
 
-// Where a view shows a point.
+// Projection of a point into a view.
 struct Place {
-  Eigen::Vector2d mid_frame_px;  // as a global shutter would
-  Eigen::Vector2d image_px;      // in the image
-  Eigen::Vector3d in_cam;        // when its row is exposed
-  Rotation cam_from_world;       // then
-  Eigen::Vector2d blur_px;       // how far it moves in the image while that is exposed
+  Eigen::Vector2d mid_frame_px;  // in a global-shutter image
+  Eigen::Vector2d image_px;      // in the actual image
+  Eigen::Vector3d in_cam;        // at the exposure of its row
+  Rotation cam_from_world;       // at the exposure of its row
+  Eigen::Vector2d blur_px;       // image motion during the exposure
 };
 
-// A part of one image, sought in another.
+// A patch of one image that is searched in another.
 struct SoughtPatch {
   const cv::Mat& image;
   Eigen::Vector2d center_px;
@@ -104,9 +104,9 @@ class Completion {
   }
 
  private:
-  // An observation farther from where the point was found may be right instead.
+  // The tracker's observation within this distance of the found position is replaced, px.
   static constexpr double kSamePointPx = 2.0;
-  // In the half-size image.
+  // Search range in the half-size image, px.
   static constexpr double kHalfReachPx = 5.0;
 
   void ListNearest(int k) {
@@ -125,7 +125,7 @@ class Completion {
     nearest.shrink_to_fit();
   }
 
-  // The observation whose ray lies in the middle of the others'.
+  // The observation whose ray is in the middle of the others.
   const Observation* FindReference(const Track& track, const Eigen::Vector3d& point) const {
     const Observation* best = nullptr;
     double least = std::numeric_limits<double>::infinity();
@@ -152,7 +152,8 @@ class Completion {
     const auto px = camera_.Project(place.in_cam);
     if (!px) return std::nullopt;
     place.mid_frame_px = place.image_px = *px;
-    // With a rolling shutter the pixel decides on the pose, which decides on the pixel.
+    // With a rolling shutter the pose depends on the row, and the row on the pose: fixed-point
+    // iteration.
     const int num_rounds = camera_.readout_s == 0.0 ? 0 : 2;
     for (int k = 0; k < num_rounds; ++k) {
       const double late_s = camera_.ExposureTime(place.image_px);
@@ -164,11 +165,11 @@ class Completion {
       place.image_px = *late_px;
     }
     place.blur_px =
-        BlurVectorOf(camera_, place.in_cam.normalized(), view.view->turn_while_exposed, 1.0);
+        BlurVectorOf(camera_, place.in_cam.normalized(), view.view->rotation_while_exposed, 1.0);
     return place;
   }
 
-  // Where the other image shows the patch, both as much blurred as they are together.
+  // Position of the patch in the other image, with both blurred alike.
   std::optional<PatchAlignment> Align(const SoughtPatch& patch,
                                       const Eigen::Matrix2d& warp,
                                       const SoughtPatch& in) const {
@@ -190,7 +191,7 @@ class Completion {
            px.y() < camera_.height - 1 - kBorderPx;
   }
 
-  // What becomes of offsets in one view's image in the other's, on a plane that faces both.
+  // Maps offsets in one image to offsets in the other, for a plane that faces both cameras.
   std::optional<Eigen::Matrix2d> Warp(const Place& from, const Place& to) const {
     const Eigen::Vector3d normal = (from.cam_from_world.Inverse() * from.in_cam.normalized() +
                                     to.cam_from_world.Inverse() * to.in_cam.normalized())
@@ -208,8 +209,9 @@ class Completion {
     return Eigen::Matrix2d(to_plane * from_plane.inverse());
   }
 
-  // Where the target shows what the source shows at the reference's keypoint, as in mid-frame.
-  // @param here  where the source shows the point.
+  // Position in the target, in a global-shutter image, of the patch around the reference's keypoint
+  // in the source.
+  // @param here  projection of the point into the source.
   std::optional<Eigen::Vector2d> Find(const Observation& reference,
                                       const PosedView& source,
                                       const Place& here,
@@ -275,7 +277,7 @@ std::optional<std::string> CompletionOptions::Problem() const {
 MapView MakeMapView(const cv::Mat& image) {
   MapView view;
   view.image = ToGrey(image);
-  // An odd row or column has no half.
+  // The last row or column of an odd size is dropped.
   const cv::Size half(view.image.cols / 2, view.image.rows / 2);
   cv::resize(view.image(cv::Rect(0, 0, 2 * half.width, 2 * half.height)),
              view.half,

@@ -46,34 +46,34 @@ struct CompletionOptions {
   }
 };
 
-/// An image that the map was made from.
+/// The image of a frame of the map.
 struct MapView {
   cv::Mat image;  // 8-bit grey
   cv::Mat half;   // the same at half the size
-  // With a rolling shutter, how the camera moved: how it turned, and its centre in world units per
-  // second.
+  // With a rolling shutter, the motion of the camera during the frame: rotation, and velocity of
+  // the centre in world units per second.
   AngularMotion motion;
   Eigen::Vector3d velocity = Eigen::Vector3d::Zero();
-  // How far the camera turned while one row was exposed, rad in camera axes; zero: sharp, or not
-  // known.
-  Eigen::Vector3d turn_while_exposed = Eigen::Vector3d::Zero();
+  // Rotation of the camera during the exposure of one row, rad in camera axes; zero where images
+  // are sharp or the exposure time is not known.
+  Eigen::Vector3d rotation_while_exposed = Eigen::Vector3d::Zero();
 };
 using MapViews = std::map<FrameId, MapView>;
 
 /// @param image  8-bit, grey or colour.
 MapView MakeMapView(const cv::Mat& image);
 
-/// Looks for every point of the map in all views that should show it, by aligning the patch around
-/// it with that of the view which sees it from the middle of the others. A tracker follows a point
-/// from image to image, so that its errors add up and what it has lost stays lost; where the map is
-/// good to a few pixels both can be corrected.
-/// @param map    the tracks' observations agree with the points.
-/// @param views  of frames that have poses, or some of them.
-/// @return  the map's tracks, in order, with the observations that were found; those that the track
-/// had itself are replaced where the point was found near them, and else kept.
+/// Searches every point of the map in all views that should see it, by aligning the patch around it
+/// with that of a reference view, which sees the point from the middle of the others. A tracker
+/// works from image to image, so that its errors add up and lost points stay lost. Where the map is
+/// accurate to a few pixels, both can be corrected.
+/// @param map  the tracks hold inliers only.
+/// @param views  of frames with poses, or some of them.
+/// @return  the map's tracks in the same order with the observations found. An observation of the
+///          tracker is replaced where the point was found near it, and else kept.
 /// Error:   keypoints to about 0.05 px (completion tests), whatever the length of the track.
 /// Cost:    about 10 us per point and view.
-/// Source:  as direct alignment to a reference does, Forster et al., SVO, ICRA 2014, sec. IV-B.
+/// Source:  Forster et al., SVO, ICRA 2014, sec. IV-B, for the alignment to a reference patch.
 std::vector<Track> CompleteTracks(const Reconstruction& map,
                                   const MapViews& views,
                                   const Camera& camera,

@@ -6,7 +6,7 @@
 
 namespace rotslam {
 
-/// Mean image motion by region, to guess that of points which have none of their own yet.
+/// Mean image motion by region, as a prediction for points that have no motion of their own yet.
 class FlowField {
  public:
   FlowField(int image_width, int image_height) : width_(image_width), height_(image_height) {}

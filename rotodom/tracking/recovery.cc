@@ -9,14 +9,15 @@
 namespace rotslam {
 namespace {
 
-// The corner of `target` that was matched, moved to where the patch of `view` fits if it does.
+// Refines the position of a matched corner of `target` by aligning the patch of `view`; unchanged
+// where that fails.
 PatchAlignment SharpenedPosition(const View& view,
                                  int index,
                                  const Eigen::Matrix2d& target_from_view,
                                  const ImagePyramid& target,
                                  const Eigen::Vector2d& corner_px,
                                  double min_correlation) {
-  constexpr double kReachPx = 3.0;
+  constexpr double kReachPx = 3.0;  // more than corners on coarse levels are off by
   PatchAlignment corner{corner_px, 0.0, Eigen::Matrix2d::Identity()};
   const auto patch = PatchTemplate::Sample(
       view.pyramid.levels.front(), view.features.keypoints_px[index], target_from_view);
@@ -25,7 +26,7 @@ PatchAlignment SharpenedPosition(const View& view,
   return found && found->correlation >= min_correlation ? *found : corner;
 }
 
-// Matches one view's points against the target's corners, which have been described.
+// Matches the points of one view with the described corners of the target.
 std::optional<Recovery> RecoverFrom(std::span<const OrientedView> views,
                                     int v,
                                     const Features& corners,
@@ -46,7 +47,7 @@ std::optional<Recovery> RecoverFrom(std::span<const OrientedView> views,
   if (!estimate) return std::nullopt;
   std::vector<BearingPair> agreeing;
   for (const int inlier : estimate->inliers) agreeing.push_back(pairs[inlier]);
-  // The rotation alone is the better guide: it does not mistake a turn for a translation.
+  // For the prediction the rotation alone is used, which cannot confuse rotation and translation.
   const Rotation target_from_view = AlignMostBearings(agreeing).value_or(estimate->j_from_i);
 
   const cv::Mat& image = target.pyramid->levels.front();
@@ -82,7 +83,7 @@ std::optional<Recovery> RecoverFrom(std::span<const OrientedView> views,
   return recovery;
 }
 
-// A clear one before others, then the one with the most points.
+// The best recovery: clear ones first, then by number of points.
 std::optional<Recovery> Clearest(std::vector<Recovery>& recoveries) {
   const auto best = std::max_element(
       recoveries.begin(), recoveries.end(), [](const Recovery& a, const Recovery& b) {
@@ -109,7 +110,7 @@ std::optional<Recovery> RecoverMotion(std::span<const OrientedView> views,
       recovery->is_clear = true;
       return recovery;
     }
-    // Few points may agree by chance: then the older views are asked as well.
+    // Few points may agree by chance, so older views are tried as well.
     recoveries.push_back(*std::move(recovery));
   }
   return Clearest(recoveries);

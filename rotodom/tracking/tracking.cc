@@ -18,19 +18,20 @@
 namespace rotslam {
 namespace {
 
-// How far a patch may move on a coarse and on the finest level, in pixels of that level.
+// Search range of a patch on a coarse and on the finest level, in pixels of that level.
 constexpr double kCoarseReachPx = 5.0;
 constexpr double kFineReachPx = 3.0;
-// Positions that two references give agree within this, or the older one shows something else.
+// Largest distance of the positions from two references. Beyond it the older reference shows
+// something else.
 constexpr double kSamePointPx = 1.0;
-// Smaller turns leave a patch as it is.
-constexpr double kTurnThatShowsDeg = 1.0;
-// Less flow beside the turn leaves it so, too.
-constexpr double kFlowThatShowsPx = 2.0;
-// Distance from the epipole, in focal lengths, of a point whose patch is stretched and sheared as
-// much as is usual: by flow over distance.
+// Rotations below this do not warp a patch visibly.
+constexpr double kVisibleRotationDeg = 1.0;
+// Flow below this, beside that of the rotation, does not warp it visibly.
+constexpr double kVisibleFlowPx = 2.0;
+// Typical stretch and shear of a patch by parallax are its flow divided by this distance from the
+// epipole, in focal lengths.
 constexpr double kDepthScale = 0.15;
-constexpr int kPatchBorderPx = 6;
+constexpr int kPatchBorderPx = 6;  // half a patch and a pixel for gradients
 
 struct Candidate {
   TrackId track;
@@ -38,7 +39,7 @@ struct Candidate {
   int index = 0;
 };
 
-// Every point that is still followed, by the newest view that shows it; ascending in `track`.
+// Every point that is still tracked, with the newest view that sees it; ascending in `track`.
 std::vector<Candidate> FindCandidates(std::span<const OrientedView> views, int max_points) {
   std::vector<Candidate> candidates;
   for (int view = 0; view < static_cast<int>(views.size()); ++view) {
@@ -89,12 +90,12 @@ class Search {
     turns_patches_.clear();
     for (const OrientedView& view : views_) {
       target_from_view_.push_back(cam_from_world * view.cam_from_world.Inverse());
-      turns_patches_.push_back(target_from_view_.back().AngleDeg() > kTurnThatShowsDeg);
+      turns_patches_.push_back(target_from_view_.back().AngleDeg() > kVisibleRotationDeg);
     }
     if (target_.exposure_s > 0.0) SetRates(cam_from_world);
   }
 
-  // Where the point should show; nullopt outside the image.
+  // Predicted position of the point; nullopt outside the image.
   std::optional<Eigen::Vector2d> Expect(const Candidate& candidate) const {
     const View& view = *views_[candidate.view].view;
     std::optional<Eigen::Vector2d> px = Turn(candidate.view, candidate.index);
@@ -109,7 +110,7 @@ class Search {
     return px;
   }
 
-  // A rough position, from further away.
+  // Rough position of a probe, with a larger search range.
   std::optional<Eigen::Vector2d> Probe(const Candidate& candidate, Eigen::Vector2d px) const {
     bool found = false;
     for (const int level : {coarsest_, middle_}) {
@@ -151,8 +152,8 @@ class Search {
            px.x() < image.cols - 1 - kPatchBorderPx && px.y() < image.rows - 1 - kPatchBorderPx;
   }
 
-  // Where the turn alone would show a point of one of the views, exposed with the pixel that shows
-  // it; nullopt: the one where it would show without a rolling shutter.
+  // Position of a view's point after the rotation alone, exposed at the time of the given pixel;
+  // for nullopt at the time of its own row.
   std::optional<Eigen::Vector2d> Turn(
       int view_index,
       int index,
@@ -165,15 +166,15 @@ class Search {
     return camera_.Project(target_.motion.After(late_s) * bearing);
   }
 
-  // What is left of the flow when the turn is taken out bends the patch, too.
-  PatchAlignment Unbend(const PatchTemplate& patch,
-                        int view_index,
-                        int index,
-                        const PatchAlignment& found) const {
+  // Corrects for the deformation of the patch by the flow that the rotation does not explain.
+  PatchAlignment CorrectParallax(const PatchTemplate& patch,
+                                 int view_index,
+                                 int index,
+                                 const PatchAlignment& found) const {
     const auto turned_px = Turn(view_index, index, found.center_px);
     if (!turned_px) return found;
     const Eigen::Vector2d flow_px = found.center_px - *turned_px;
-    if (flow_px.norm() < kFlowThatShowsPx) return found;
+    if (flow_px.norm() < kVisibleFlowPx) return found;
     const PatchParallax parallax{flow_px, flow_px.norm() / (kDepthScale * camera_.MeanFocal())};
     const auto corrected =
         CorrectForParallax(patch, target_.pyramid->levels.front(), found, parallax);
@@ -194,13 +195,13 @@ class Search {
     std::transform(all.begin() + 1, all.end(), std::back_inserter(view_rates_), rate_of);
   }
 
-  // How far a point moves in either image while that is exposed, in pixels of a level.
+  // Motion of a point during the exposure of either image, in pixels of a level.
   struct BlurVectors {
     Eigen::Vector2d in_view;
     Eigen::Vector2d in_target;
   };
 
-  // nullopt where both are blurred alike, or nobody knows.
+  // nullopt where both are blurred alike, or the motion is not known.
   std::optional<BlurVectors> BlurVectorsOf(int view_index,
                                            int index,
                                            int level,
@@ -224,7 +225,7 @@ class Search {
     return found && found->correlation >= options_.min_correlation;
   }
 
-  // In pixels of the level.
+  // Aligns the patch on one level; positions are in pixels of the level.
   std::optional<PatchAlignment> AlignAtLevel(int view_index,
                                              int index,
                                              int level,
@@ -249,7 +250,8 @@ class Search {
     const auto patch = PatchTemplate::Sample(image, center_px, warp);
     if (!patch) return std::nullopt;
     const auto found = AlignPatch(*patch, target, start_px, reach_px);
-    return level == 0 && IsAlike(found) ? Unbend(*patch, view_index, index, *found) : found;
+    return level == 0 && IsAlike(found) ? CorrectParallax(*patch, view_index, index, *found)
+                                        : found;
   }
 
   std::optional<Location> Align(
@@ -270,12 +272,12 @@ class Search {
   int middle_ = 0;
   std::vector<Rotation> target_from_view_;
   std::vector<bool> turns_patches_;
-  // Where exposure matters and they are known, rad/s.
+  // Angular velocities, rad/s; set where they are known and the exposure time matters.
   std::optional<Eigen::Vector3d> target_rate_;
   std::vector<std::optional<Eigen::Vector3d>> view_rates_;
 };
 
-// The turn of the camera that most of the probes show beside the expected one.
+// Correction of the predicted rotation by the majority of the probes.
 Rotation ProbeRotation(const Search& search,
                        const std::vector<Candidate>& candidates,
                        const Camera& camera,

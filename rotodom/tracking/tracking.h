@@ -47,19 +47,19 @@ struct TrackingOptions {
   }
 };
 
-/// The image in which points are sought, and where they are expected.
+/// The image in which points are tracked, and the predicted motion.
 struct TrackingTarget {
   const ImagePyramid* pyramid = nullptr;
   double timestamp_s = 0.0;
   Rotation cam_from_world;
-  // Of the camera at the target, for a rolling shutter.
+  // Motion of the camera during the target's exposure, for a rolling shutter.
   AngularMotion motion;
-  // When given, the motion beside the rotation; otherwise each point goes on with its own.
+  // When set, the image motion beside that of the rotation; otherwise each point keeps its own.
   const FlowField* flow = nullptr;
-  // Of the target and the views; where they turned at different rates, that much more of the one
-  // is blurred. 0: nothing is.
+  // Exposure time of the target and the views. Where they rotate at different rates, one of the
+  // patches is blurred accordingly. 0: no blurring.
   double exposure_s = 0.0;
-  // Points beyond this number that are not in the newest view are not looked for.
+  // Beyond this number, points that are not in the newest view are not tracked.
   int max_points = 2000;
 };
 
@@ -75,29 +75,29 @@ struct TrackedPoint {
 struct TrackingResult {
   Rotation cam_from_world;           // the target's prediction, corrected by the probes
   std::vector<TrackedPoint> points;  // ascending in `track`
-  int num_sought = 0;                // points whose expected place lies inside the image
+  int num_sought = 0;                // points whose predicted position is inside the image
 
   bool IsPoor(const TrackingOptions& options) const;
 };
 
-/// Looks for the points of `views` in the target by aligning the patches around them, each turned
-/// as the rotation between the two views says.
+/// Tracks the points of `views` into the target by aligning the patches around them, warped by the
+/// rotation between the two views.
 ///
-/// A few probes, spread over the image and sought over a longer way, correct the predicted
-/// rotation first; then every point is sought from where it is expected, from the newest view that
-/// shows it, and sharpened against older ones.
+/// A few probes, spread over the image and with a larger search range, first correct the predicted
+/// rotation. Then each point is aligned from its prediction with the patch of the newest view that
+/// sees it, and refined against older views.
 /// @param views  newest first.
-/// @return  the answer does not depend on num_threads.
-/// Error:   about 0.03 px on clean images (tracking tests); up to 20 px of error in the prediction
-/// are caught by the probes, up to 5 px in each point's own motion.
-/// Cost:    about 2 us a point and reference.
+/// @return  the same at any num_threads.
+/// Error:   about 0.03 px on clean images (tracking tests). The probes correct predictions that are
+///          off by up to 20 px; the motion of each point may differ by up to 5 px.
+/// Cost:    about 2 us per point and reference.
 TrackingResult TrackPoints(std::span<const OrientedView> views,
                            const TrackingTarget& target,
                            const Camera& camera,
                            const TrackingOptions& options,
                            int num_threads);
 
-/// Rotation that best aligns most of the pairs' bearings, R f_i ~ f_j, whatever the others do.
+/// Rotation that best aligns most of the pairs' bearings, R f_i ~ f_j; robust to outliers.
 /// @return  nullopt for fewer than ten pairs.
 std::optional<Rotation> AlignMostBearings(const std::vector<BearingPair>& pairs);
 

@@ -14,7 +14,7 @@ namespace {
 
 struct Ray {
   int track;
-  Eigen::Vector3d direction;  // in the world's axes
+  Eigen::Vector3d direction;  // in world axes
 };
 
 std::map<FrameId, std::vector<Ray>> RaysOfFrames(const RotationMap& cam_from_world,
@@ -51,7 +51,7 @@ Overlap Compare(const std::vector<Ray>& keyframe, const std::vector<Ray>& frame)
   return {overlap, Median(std::move(angles))};
 }
 
-// How often keyframes saw each track so far.
+// Number of keyframes so far that see each track.
 class Sightings {
  public:
   explicit Sightings(std::size_t num_tracks) : counts_(num_tracks, 0) {}
@@ -59,7 +59,8 @@ class Sightings {
   void Add(const std::vector<Ray>& keyframe) {
     for (const Ray& ray : keyframe) ++counts_[ray.track];
   }
-  // Tracks of a frame that keyframes see under two angles: they carry the scale on.
+  // Number of a frame's tracks seen by two keyframes: their points have depth and propagate the
+  // scale.
   int NumLinks(const std::vector<Ray>& frame) const {
     return static_cast<int>(std::count_if(
         frame.begin(), frame.end(), [&](const Ray& ray) { return counts_[ray.track] >= 2; }));
@@ -69,12 +70,12 @@ class Sightings {
   std::vector<int> counts_;
 };
 
-// One pass over the frames.
-// @param rays_of  of every frame that sees something.
+// Selects keyframes in one pass over the frames.
+// @param rays_of  rays of every frame with tracks.
 std::set<FrameId> SelectFrom(const RotationMap& cam_from_world,
                              const std::map<FrameId, std::vector<Ray>>& rays_of,
                              std::size_t num_tracks,
-                             const std::vector<PureRotationSegment>& held,
+                             const std::vector<PureRotationSegment>& segments,
                              const KeyframeOptions& options) {
   std::set<FrameId> keyframes;
   Sightings sightings(num_tracks);
@@ -91,12 +92,12 @@ std::set<FrameId> SelectFrom(const RotationMap& cam_from_world,
   };
   take(keyframe);
   for (const auto& [frame, rotation] : cam_from_world) {
-    const auto stretch =
-        std::find_if(held.begin(), held.end(), [&, f = frame](const PureRotationSegment& s) {
+    const auto segment = std::find_if(
+        segments.begin(), segments.end(), [&, f = frame](const PureRotationSegment& s) {
           return s.first <= f && f <= s.last;
         });
-    if (stretch != held.end()) {
-      if (frame == stretch->first || frame == stretch->last) take(frame);
+    if (segment != segments.end()) {
+      if (frame == segment->first || frame == segment->last) take(frame);
       before = frame;
       continue;
     }
@@ -110,7 +111,7 @@ std::set<FrameId> SelectFrom(const RotationMap& cam_from_world,
         options.min_linked_ratio * static_cast<double>(rays(keyframe).size());
     const bool breaks = keyframes.size() > 1 && sightings.NumLinks(rays(frame)) < least_links;
     if ((overlap.shared_ratio < options.min_shared_ratio || breaks) && before > keyframe) {
-      // Too late: the frame before still shares enough.
+      // This frame shares too few tracks; the frame before becomes the keyframe.
       take(before);
       overlap = Compare(rays(keyframe), rays(frame));
     }
@@ -143,19 +144,19 @@ std::optional<std::string> KeyframeOptions::Problem() const {
 
 std::set<FrameId> SelectKeyframes(const RotationMap& cam_from_world,
                                   const std::vector<Track>& tracks,
-                                  const std::vector<PureRotationSegment>& held,
+                                  const std::vector<PureRotationSegment>& segments,
                                   const KeyframeOptions& options) {
   if (const auto problem = options.Problem())
     throw std::invalid_argument("KeyframeOptions: " + *problem);
   if (cam_from_world.empty()) return {};
   const auto rays_of = RaysOfFrames(cam_from_world, tracks);
-  constexpr int kMaxHalvings = 4;
+  constexpr int kMaxHalvings = 4;  // of the parallax, see KeyframeOptions::min_keyframes
   KeyframeOptions asked = options;
-  std::set<FrameId> keyframes = SelectFrom(cam_from_world, rays_of, tracks.size(), held, asked);
+  std::set<FrameId> keyframes = SelectFrom(cam_from_world, rays_of, tracks.size(), segments, asked);
   for (int k = 0; k < kMaxHalvings && options.every_frames == 0; ++k) {
     if (static_cast<int>(keyframes.size()) >= options.min_keyframes) break;
     asked.min_parallax_deg /= 2.0;
-    keyframes = SelectFrom(cam_from_world, rays_of, tracks.size(), held, asked);
+    keyframes = SelectFrom(cam_from_world, rays_of, tracks.size(), segments, asked);
   }
   return keyframes;
 }

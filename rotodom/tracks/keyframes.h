@@ -26,7 +26,7 @@ struct KeyframeOptions {
   // Where these give fewer keyframes, as of a short walk, less parallax is asked for: half of it,
   // up to four times. Two keyframes give no map, three tell a lens badly.
   int min_keyframes = 5;
-  // When positive, every so many frames one is a keyframe instead, whatever it shows; held
+  // When positive, every so many frames one is a keyframe instead, whatever it shows; pure-rotation
   // segments have theirs all the same.
   int every_frames = 0;
 
@@ -42,17 +42,17 @@ struct KeyframeOptions {
   }
 };
 
-/// Chooses the frames that carry the map. The first and the last frame of `cam_from_world` and of
-/// every pure-rotation segment are keyframes; inside a segment there are no others.
+/// Selects the keyframes. The first and the last frame of `cam_from_world` and of every
+/// pure-rotation segment are keyframes; there are no others within a segment.
 /// @param tracks  over all frames, not only keyframes.
 /// Cost:    linear in the number of observations.
 std::set<FrameId> SelectKeyframes(const RotationMap& cam_from_world,
                                   const std::vector<Track>& tracks,
-                                  const std::vector<PureRotationSegment>& held,
+                                  const std::vector<PureRotationSegment>& segments,
                                   const KeyframeOptions& options);
 
-/// The tracks with their observations in `frames` only; tracks left with fewer than `min_length`
-/// go.
+/// Restricts the tracks to observations in `frames`; tracks with fewer than `min_length`
+/// observations are dropped.
 std::vector<Track> RestrictTracks(const std::vector<Track>& tracks,
                                   const std::set<FrameId>& frames,
                                   int min_length);

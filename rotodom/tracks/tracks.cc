@@ -7,7 +7,7 @@
 namespace rotslam {
 namespace {
 
-// Disjoint sets of keypoints; each set knows its frames and never holds two keypoints of one.
+// Disjoint sets of keypoints with at most one keypoint per frame in each set.
 class TrackSets {
  public:
   explicit TrackSets(std::vector<int> frame_of)

@@ -18,10 +18,11 @@ struct EdgeMatches {
 };
 
 /// Joins pairwise matches into tracks (union-find). A match that would put two keypoints of one
-/// frame into one track is left out; earlier edges come first, so hand in the most trusted ones
+/// frame into a track is dropped. Earlier edges take precedence, so pass the most reliable ones
 /// first.
 /// @param features        of every frame that an edge names.
-/// @param observed_from   only observations in these frames are returned; the others still join.
+/// @param observed_from  only observations in these frames are returned; those in other frames
+///                       still join tracks.
 /// @param min_length      tracks with fewer observations are left out.
 /// @return  tracks with consecutive ids, ordered by their first frame and keypoint.
 /// Cost:    near-linear in the number of matches.

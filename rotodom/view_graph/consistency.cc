@@ -10,7 +10,7 @@ struct Choice {
   double cost = std::numeric_limits<double>::infinity();
 };
 
-// The hypothesis that suits the orientation best.
+// The hypothesis that agrees best with the orientation.
 Choice BestFor(const Rotation& cam_from_world, const PairHypotheses& pair) {
   Choice best;
   for (int h = 0; h < std::ssize(pair.hypotheses); ++h) {

@@ -7,27 +7,27 @@
 
 namespace rotslam {
 
-/// What the orientation of a view may be by its matches with another one.
+/// A candidate for the orientation of a view from its matches with another view.
 struct OrientationHypothesis {
   Rotation cam_from_world;
   double excess = 0.0;  // as in RelativeRotationEstimate
 };
 
-/// One pair of views' hypotheses, one at least.
+/// The hypotheses of one pair of views, at least one.
 struct PairHypotheses {
   std::vector<OrientationHypothesis> hypotheses;
-  double weight = 1.0;  // of the pair's word among the others'
+  double weight = 1.0;  // of the pair
 };
 
-/// Chooses a hypothesis of each pair so that they agree best on the orientation of the view that
-/// all pairs have in common. Where two views see little but a plane, two motions fit their matches;
-/// the right ones of several pairs agree, the wrong ones do not.
+/// Selects one hypothesis of each pair such that they agree best on the orientation of the view
+/// that all pairs have in common. Where two views see little but a plane, two motions fit their
+/// matches. The right ones of several pairs agree, the wrong ones do not.
 ///
-/// Of all orientations that a hypothesis names, the one counts whose cost is least: the sum over
-/// pairs of weight * min_h (a^2 / (1 + a^2) + excess_h), a the angle to hypothesis h in degrees,
-/// about what edges across seconds are wrong by.
-/// @return  positions of the chosen hypotheses, one per pair. One pair alone, or two that cannot
-///          agree, keep the one with the least excess.
+/// The orientation with the least cost among all hypotheses is chosen. The cost is the sum over
+/// pairs of weight * min_h (a^2 / (1 + a^2) + excess_h), with a the angle to hypothesis h in
+/// degrees; one degree is about the error of edges across seconds.
+/// @return  indices of the chosen hypotheses, one per pair. A single pair, or two pairs without
+///          agreement, keep the hypothesis with the least excess.
 /// Cost:    quadratic in the number of hypotheses.
 std::vector<int> ChooseConsistent(std::span<const PairHypotheses> pairs);
 

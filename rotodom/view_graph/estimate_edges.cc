@@ -10,7 +10,8 @@
 namespace rotslam {
 namespace {
 
-// Both zero where the keypoint is a new corner's; none where a view does not know its own.
+// Covariances of the keypoints; zero for both where a keypoint is a new corner, empty where a view
+// has none.
 std::vector<KeypointCovariances> CovariancesOf(const Features& view_i,
                                                const Features& view_j,
                                                const std::vector<std::array<int, 2>>& keypoints) {
@@ -41,7 +42,7 @@ std::vector<std::array<int, 2>> FindCommonPoints(const Features& view_i, const F
   return keypoints;
 }
 
-// The connection as an estimate from these keypoints sees it.
+// Makes an edge of an estimate and its keypoints.
 EdgeWithMatches EdgeWithMatchesOf(const RelativeRotationEstimate& estimate,
                                   FrameId i,
                                   FrameId j,
@@ -69,7 +70,7 @@ EdgeWithMatches EdgeWithMatchesOf(const RelativeRotationEstimate& estimate,
   return connection;
 }
 
-// What a pair of views may be connected by, the best first.
+// Candidate edges of a pair of views, the best first.
 struct EdgeHypotheses {
   std::vector<EdgeWithMatches> connections;
   std::vector<double> excesses;
@@ -109,8 +110,8 @@ EdgeHypotheses HypothesesByMatches(const Features& view_i,
   return hypotheses;
 }
 
-// What the others' hypotheses say of the view's orientation; pairs count by the precision that
-// their number of points gives them.
+// Orientations of the view by the hypotheses of a pair. Pairs are weighted by the precision that
+// follows from their number of points.
 PairHypotheses OrientationsBy(const EdgeHypotheses& hypotheses, const RotationMap& cam_from_world) {
   PairHypotheses pair;
   pair.weight = std::sqrt(static_cast<double>(hypotheses.connections.front().edge.num_inliers));

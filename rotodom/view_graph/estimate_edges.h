@@ -48,23 +48,23 @@ struct ViewGraphOptions {
   }
 };
 
-/// A measured edge of the view-graph together with the matches it rests on.
+/// An edge of the view-graph with its matches.
 struct EdgeWithMatches {
   RelativeRotation edge;
-  EdgeMatches matches;          // those that agree with the edge
-  std::vector<int> outliers_j;  // keypoints of frame j whose match does not
+  EdgeMatches matches;          // inliers of the edge
+  std::vector<int> outliers_j;  // keypoints of frame j whose match is an outlier
 };
 
-/// Of edges between pairs of views.
+/// Options for the estimation of edges.
 struct EdgeOptions {
   RelativeRotationOptions relative_rotation;
   std::uint64_t seed = 1;
   int num_threads = 1;
 };
 
-/// The edge between two views from keypoints that seem to show the same points.
+/// Estimates the edge between two views from matched keypoints.
 /// @param keypoints  of view_i and of view_j.
-/// @param noise      one for each of them, or none: then they are all alike.
+/// @param noise  one for each of them; none: all are equal.
 /// @return  nullopt when fewer than relative_rotation.min_inliers of them agree.
 std::optional<EdgeWithMatches> EstimateEdge(const Features& view_i,
                                             const Features& view_j,
@@ -74,12 +74,12 @@ std::optional<EdgeWithMatches> EstimateEdge(const Features& view_i,
                                             const EdgeOptions& options,
                                             std::span<const MatchNoise> noise = {});
 
-/// Estimates the relative rotations between `view` and each of `others` from the points that both
-/// show. Where those allow two rotations, the one that agrees with the other pairs is taken
+/// Estimates the relative rotations between `view` and each of `others` from their common points.
+/// Where these allow two rotations, the one that agrees with the other pairs is selected
 /// (ChooseConsistent).
 /// @param predicted_cam_from_world  start orientations of all views concerned.
-/// @return  one connection per other view that agrees on at least relative_rotation.min_inliers
-///          points, in the order of `others`; the thread count does not change it.
+/// @return  one edge for each view with at least relative_rotation.min_inliers agreeing points, in
+///          the order of `others`; the same at any thread count.
 std::vector<EdgeWithMatches> EstimateEdges(const Features& view,
                                            const std::vector<const Features*>& others,
                                            const RotationMap& predicted_cam_from_world,

@@ -35,8 +35,8 @@ struct RunFlags {
   bool use_report = true;
 };
 
-// The first frame on a part of the map, as segments.csv has it: what its first keyframes see may
-// still be held at the end of the part before.
+// The first frame of a component of the map, as segments.csv has it. Its first keyframes may lie
+// before that frame, in the pure-rotation segment at the end of the component before.
 int FirstFrame(const std::vector<Segment>& segments, const MapComponent& part, int number) {
   for (const Segment& segment : segments) {
     if (segment.component == number) return segment.first_frame;
@@ -84,7 +84,7 @@ int Run(const RunFlags& flags) {
   }
 
   const MapResult positions = [&] {
-    const LastWords last_words(interruption, end_early);
+    const EndAtInterruption end_at_interruption(interruption, end_early);
     return BuildMap(orientations, options, input.frames.get(), observer);
   }();
   const double positions_s = SecondsSince(start) - orientations_s - guess_s;
@@ -98,7 +98,7 @@ int Run(const RunFlags& flags) {
 
   RunSummary summary = StartSummary("run", input, orientations, DescribeOptions(options));
   AddPositions(positions, input.camera, summary);
-  const bool rotates_by_lens = positions.is_held_throughout && positions.camera != input.camera;
+  const bool rotates_by_lens = positions.rotates_throughout && positions.camera != input.camera;
   if (rotates_by_lens) {
     summary.calibration = {{"source", "pure_rotation"},
                            {"given_px", input.camera.MeanFocal()},
@@ -113,17 +113,23 @@ int Run(const RunFlags& flags) {
   outputs.Publish();
 
   for (int k = 1; k < std::ssize(positions.components); ++k) {
-    progress.Warn("no tracks tie the scale of the map from frame " +
+    progress.Warn("the map from frame " +
                   std::to_string(FirstFrame(*summary.segments, positions.components[k], k)) +
-                  " on to the part before; it is set so that what is seen stays as far away");
+                  " on shares no points with the part before: its scale is a guess, so that the "
+                  "scene stays as far away as it was, and distances there may be too long or too "
+                  "short. Film such changes of view more slowly, with part of the old view in the "
+                  "picture");
   }
   if (input.guess) progress.Warn(WarningOf(*input.guess, positions.camera));
-  if (positions.is_held_throughout) {
+  if (positions.rotates_throughout) {
     progress.Warn(
-        "the camera never leaves its place, so there are no positions and no points to find" +
-        (rotates_by_lens ? "; only the calibration makes it seem to move, it fits better as " +
-                               DescribeRounded(positions.camera)
-                         : std::string()));
+        "the camera never leaves its place, it only rotates: the result has orientations, no "
+        "positions and no points. For a map, walk while you film" +
+        (rotates_by_lens
+             ? ". With the calibration given the camera seems to move; without movement "
+               "this one fits better: " +
+                   DescribeRounded(positions.camera)
+             : std::string()));
   }
   if (flags.use_report) WriteReportOfRun(directory, flags.common, progress);
   checkpoint.Remove();

@@ -16,7 +16,7 @@ void RefineGuess(const RunOptions& options,
                  Input& input) {
   if (!input.guess) return;
   SlamProgress observer(options, interruption, progress);
-  const LastWords last_words(interruption, [&] {
+  const EndAtInterruption end_at_interruption(interruption, [&] {
     progress.Warn("interrupted while the focal length is sought: nothing is written yet");
   });
   const FocalLengthEstimate estimate =

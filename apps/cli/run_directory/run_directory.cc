@@ -96,8 +96,8 @@ std::vector<LoopRow> LoopRows(const Orientations& orientations) {
                     check.num_inliers,
                     check.angle_deg,
                     check.accepted,
-                    check.way.turn_scale,
-                    check.way.angle_deg,
+                    check.scaled.turn_scale,
+                    check.scaled.angle_deg,
                     check.num_edges});
   }
   return rows;
@@ -116,9 +116,9 @@ int ComponentAt(const std::vector<MapComponent>& components, int frame) {
   return found;
 }
 
-// What a frame belongs to: its segment, or -1, and the way it moves there.
+// The pure-rotation segment that a frame belongs to, -1 for none, and how the camera moves there.
 struct FrameMotion {
-  int stretch = -1;
+  int pure_rotation = -1;
   const char* kind = "translating";
 
   bool operator==(const FrameMotion& other) const = default;
@@ -126,10 +126,10 @@ struct FrameMotion {
 
 std::vector<FrameMotion> MotionOfFrames(const MapResult& positions) {
   std::vector<FrameMotion> motions(positions.cam_from_world.size());
-  for (int k = 0; k < std::ssize(positions.held); ++k) {
-    const PureRotationSegment& stretch = positions.held[k];
-    for (int n = stretch.first.value; n <= stretch.last.value; ++n) motions[n] = {k, "rotating"};
-    for (const FrameRange& still : stretch.still) {
+  for (int k = 0; k < std::ssize(positions.segments); ++k) {
+    const PureRotationSegment& segment = positions.segments[k];
+    for (int n = segment.first.value; n <= segment.last.value; ++n) motions[n] = {k, "rotating"};
+    for (const FrameRange& still : segment.still) {
       for (int n = still.first.value; n <= still.last.value; ++n) motions[n].kind = "still";
     }
   }
@@ -142,12 +142,12 @@ std::string ScaleOf(const MapResult& positions, int component, int first_frame) 
   if (component < 0) return "none";
   const MapComponent& part = positions.components[component];
   if (part.placed_by_default) return "continuity";
-  const auto held_before = std::find_if(
-      positions.held.rbegin(), positions.held.rend(), [&](const PureRotationSegment& stretch) {
-        return stretch.last.value < first_frame;
-      });
-  const bool is_tied =
-      held_before != positions.held.rend() && *part.keyframes.begin() < held_before->first;
+  const auto segment_before = std::find_if(
+      positions.segments.rbegin(),
+      positions.segments.rend(),
+      [&](const PureRotationSegment& segment) { return segment.last.value < first_frame; });
+  const bool is_tied = segment_before != positions.segments.rend() &&
+                       *part.keyframes.begin() < segment_before->first;
   return is_tied ? "tracks" : "reference";
 }
 
@@ -162,13 +162,13 @@ std::vector<Segment> Segments(const MapResult& positions) {
   std::vector<Segment> segments;
   for (int n = 0; n < std::ssize(motions); ++n) {
     const bool begins = n == 0 || motions[n] != motions[n - 1] ||
-                        (motions[n].stretch < 0 && component_starts.contains(n));
+                        (motions[n].pure_rotation < 0 && component_starts.contains(n));
     if (begins) {
       Segment& segment = segments.emplace_back();
       segment.first_frame = n;
       segment.kind = motions[n].kind;
-      const int stretch = motions[n].stretch;
-      segment.evidence = stretch < 0 ? 0.0 : positions.held[stretch].evidence;
+      const int pure_rotation = motions[n].pure_rotation;
+      segment.evidence = pure_rotation < 0 ? 0.0 : positions.segments[pure_rotation].evidence;
       segment.component = ComponentAt(positions.components, n);
       segment.scale = ScaleOf(positions, segment.component, n);
     }

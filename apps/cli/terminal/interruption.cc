@@ -16,15 +16,15 @@ bool IsIgnored(int signal) {
   return sigaction(signal, nullptr, &action) == 0 && action.sa_handler == SIG_IGN;
 }
 
-// Other threads are in mid-work: nothing of theirs is taken down in order.
+// Other threads may be running, so no destructors are called.
 [[noreturn]] void EndAtOnce() {
   RemoveTemporaryFiles();
   _exit(Interruption::kExitCode);
 }
 
-[[noreturn]] void EndAfter(const std::function<void()>& last_words) {
+[[noreturn]] void EndAfter(const std::function<void()>& end_at_interruption) {
   try {
-    last_words();
+    end_at_interruption();
   } catch (const std::exception& error) {
     PrintError(error.what());
   }
@@ -53,10 +53,10 @@ Interruption::~Interruption() {
   pthread_sigmask(SIG_SETMASK, &blocked_before_, nullptr);
 }
 
-void Interruption::EndWith(std::function<void()> last_words) {
+void Interruption::EndWith(std::function<void()> end_at_interruption) {
   const std::scoped_lock lock(mutex_);
-  last_words_ = std::move(last_words);
-  if (last_words_ && is_requested_) EndAfter(last_words_);
+  at_end_ = std::move(end_at_interruption);
+  if (at_end_ && is_requested_) EndAfter(at_end_);
 }
 
 void Interruption::Wait() {
@@ -64,7 +64,7 @@ void Interruption::Wait() {
   while (sigwait(&signals_, &signal) == 0 && !is_over_) {
     if (is_requested_.exchange(true)) EndAtOnce();
     const std::scoped_lock lock(mutex_);
-    if (last_words_) EndAfter(last_words_);
+    if (at_end_) EndAfter(at_end_);
   }
 }
 

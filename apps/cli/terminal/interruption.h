@@ -11,21 +11,22 @@
 
 namespace rotslam {
 
-/// There is nothing to write yet: the program ends with Interruption::kExitCode and this line.
+/// Thrown where there is no result to write yet: the program ends with Interruption::kExitCode and
+/// this message.
 class InterruptedError : public std::runtime_error {
  public:
   using std::runtime_error::runtime_error;
 };
 
-/// What Ctrl-C (SIGINT) and SIGTERM do to a command that wants to end in order. The first one is a
-/// request; the second ends the program at once, without half-written files. A signal that was
-/// ignored at the start stays ignored.
+/// Handles Ctrl-C (SIGINT) and SIGTERM for commands that finish their work first. The first signal
+/// is a request; the second one ends the program at once, without half-written files. A signal that
+/// was ignored at the start stays ignored.
 ///
-/// A thread of its own waits for the signals, which are blocked in all others: make this object
-/// before anything that starts threads.
+/// A separate thread waits for the signals, which are blocked in all others: create this object
+/// before any code that starts threads.
 class Interruption {
  public:
-  // As shells give it for SIGINT.
+  // The exit code that shells use for SIGINT.
   static constexpr int kExitCode = 130;
 
   Interruption();
@@ -37,32 +38,33 @@ class Interruption {
   bool IsRequested() const { return is_requested_; }
 
  private:
-  friend class LastWords;
+  friend class EndAtInterruption;
 
-  void EndWith(std::function<void()> last_words);
+  void EndWith(std::function<void()> end_at_interruption);
   void Wait();
 
   sigset_t signals_ = {};
   sigset_t blocked_before_ = {};
   std::atomic<bool> is_requested_ = false;
   std::atomic<bool> is_over_ = false;
-  std::mutex mutex_;  // of last_words_, also while it runs
-  std::function<void()> last_words_;
-  int wake_ = 0;  // one that ends the waiting; 0: all are ignored, nobody waits
+  std::mutex mutex_;  // of at_end_, also while it runs
+  std::function<void()> at_end_;
+  int wake_ = 0;  // a signal that ends the waiting; 0: all are ignored, no thread waits
   std::thread waiting_;
 };
 
-/// While this lives the request itself ends the program, after a call of `say` on the waiting
-/// thread: around work that cannot be stopped halfway and would be lost anyway. Where the request
-/// has been made before, it ends here.
-class LastWords {
+/// While this object exists, the first signal ends the program after a call of `say` on the waiting
+/// thread: for work that cannot be stopped half way and whose results would be lost. If the signal
+/// came before, the program ends in the constructor.
+class EndAtInterruption {
  public:
-  LastWords(Interruption& interruption, std::function<void()> say) : interruption_(interruption) {
+  EndAtInterruption(Interruption& interruption, std::function<void()> say)
+      : interruption_(interruption) {
     interruption_.EndWith(std::move(say));
   }
-  ~LastWords() { interruption_.EndWith(nullptr); }
-  LastWords(const LastWords&) = delete;
-  LastWords& operator=(const LastWords&) = delete;
+  ~EndAtInterruption() { interruption_.EndWith(nullptr); }
+  EndAtInterruption(const EndAtInterruption&) = delete;
+  EndAtInterruption& operator=(const EndAtInterruption&) = delete;
 
  private:
   Interruption& interruption_;

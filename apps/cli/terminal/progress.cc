@@ -20,13 +20,13 @@
 namespace rotslam {
 namespace {
 
-// How often the line is renewed on a terminal, and a plain line is written elsewhere.
+// Intervals between updates of the line on a terminal, and between plain lines elsewhere.
 constexpr std::chrono::milliseconds kTerminalInterval(100);
 constexpr std::chrono::seconds kPlainInterval(10);
-// How often a stage without steps is seen to be alive.
+// Interval between updates of a stage without steps.
 constexpr std::chrono::seconds kTickInterval(1);
 
-// Under which name the log is known to PrintError.
+// Name under which PrintError finds the log.
 constexpr const char* kLogName = "rotslam";
 
 // Select graphic rendition, ECMA-48.
@@ -64,9 +64,8 @@ std::shared_ptr<spdlog::logger> OpenLog(const std::string& path) {
   }
 }
 
-// Names of files and what stands in them may hold anything: nothing of it steers the terminal.
-// Control characters are the bytes below a blank, 127, and in UTF-8 U+0080 to U+009F. A message
-// that quotes a word of a megabyte is cut.
+// Replaces control characters, so that file names and contents cannot control the terminal: bytes
+// below a blank, 127, and in UTF-8 U+0080 to U+009F. Very long messages are cut.
 std::string Printable(std::string text) {
   constexpr std::size_t kMaxLength = 2000;
   if (text.size() > kMaxLength) text = text.substr(0, kMaxLength) + "...";
@@ -84,7 +83,7 @@ std::string Printable(std::string text) {
   return text;
 }
 
-// The first `width` columns; what continues a UTF-8 character takes none.
+// The first `width` columns of a text; continuation bytes of UTF-8 have no width.
 std::string_view FirstColumns(std::string_view text, std::size_t width) {
   std::size_t columns = 0;
   for (std::size_t k = 0; k < text.size(); ++k) {
@@ -94,7 +93,7 @@ std::string_view FirstColumns(std::string_view text, std::size_t width) {
   return text;
 }
 
-// A line that wraps could not be taken back.
+// Width of a line that can be overwritten: a wrapped line cannot.
 std::size_t WidthOfLine() {
   winsize window{};
   const bool is_known = ioctl(STDERR_FILENO, TIOCGWINSZ, &window) == 0 && window.ws_col > 1;
@@ -123,7 +122,8 @@ Progress::Progress(const CommonFlags& flags)
       terminal_(isatty(STDERR_FILENO) != 0),
       colour_(ColoursAreWanted()),
       log_(OpenLog(flags.log)) {
-  // PrintError finds it there, also after this has gone: an error passes here on its way to main.
+  // Registered so that PrintError finds the log, even after this object is destroyed by an
+  // exception on its way to main.
   if (log_) spdlog::register_logger(log_);
   if (terminal_ && !quiet_) ticker_ = std::thread([this] { Tick(); });
 }

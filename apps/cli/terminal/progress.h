@@ -16,30 +16,30 @@ class logger;
 
 namespace rotslam {
 
-/// Tells a person how a run is getting on: one line that renews itself on a terminal, a plain line
-/// now and then elsewhere. Writes to standard error; warnings are shown even when quiet. The log
-/// file gets every line, details included, with its time. May be used from several threads.
+/// Shows the progress of a run: one line that is updated on a terminal, and a plain line at
+/// intervals elsewhere. Writes to standard error; warnings are shown even when quiet. The log file
+/// gets every line, details included, with its time. May be used from several threads.
 class Progress {
  public:
   /// Throws std::runtime_error when the log file cannot be written.
   explicit Progress(const CommonFlags& flags);
-  /// Takes the renewed line away, so that an error's own line stands alone.
+  /// Removes the updated line, so that an error message has a line of its own.
   ~Progress();
   Progress(const Progress&) = delete;
   Progress& operator=(const Progress&) = delete;
 
-  /// A line that stays; control characters, which names of files may hold, are shown as '?'.
+  /// Prints a permanent line. Control characters, which file names may contain, are shown as '?'.
   void Say(const std::string& line);
   void Warn(const std::string& line);
-  /// A line that only --verbose shows.
+  /// Prints a line with --verbose only.
   void Detail(const std::string& line);
 
-  /// Begins a stage of `total` steps (negative: not known).
+  /// Starts a stage of `total` steps (negative: not known).
   void StartStage(const std::string& name, int total);
-  /// Step `done` of the stage is finished. The counters are shown behind the figures, as many as
-  /// there is room for.
+  /// Reports that `done` steps of the stage are finished. Counters are shown after the figures as
+  /// far as the line has room.
   void Step(int done, const std::vector<std::string>& counters = {});
-  /// Ends the stage with one line that stays.
+  /// Ends the stage with a permanent line.
   void EndStage(const std::string& note = {});
 
  private:
@@ -49,7 +49,7 @@ class Progress {
   void Renew();
   void Print(const std::string& line);
   void ClearLine();
-  // Shows the seconds of a stage that makes no steps.
+  // Updates the seconds of a stage without steps.
   void Tick();
 
   bool quiet_;

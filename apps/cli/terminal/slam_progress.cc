@@ -4,6 +4,7 @@
 #include <array>
 #include <cmath>
 #include <cstdio>
+#include <iterator>
 #include <vector>
 
 #include "apps/cli/terminal/describe.h"
@@ -12,7 +13,7 @@
 
 namespace rotslam {
 
-// What runs past while the sequence is read.
+// Counts that are shown while the sequence is read.
 class SlamProgress::Counters {
  public:
   explicit Counters(const PureRotationOptions& options) : options_(options) {}
@@ -21,12 +22,13 @@ class SlamProgress::Counters {
     num_loops_ += std::count_if(estimate.loops.begin(),
                                 estimate.loops.end(),
                                 [](const LoopCheck& check) { return check.accepted; });
-    // A look takes time in proportion to what has been read: rarer and rarer, so that all of them
-    // together do, too.
-    constexpr int kFramesBetweenLooks = 30;
-    if (estimate.frame.value >= next_look_) {
+    // Counting takes time in proportion to the frames read so far. The interval grows with them, so
+    // that the time of all counts together stays in proportion to the length of the sequence.
+    constexpr int kMinFramesBetweenCounts = 30;  // about a second of video
+    if (estimate.frame.value >= next_count_) {
       num_segments_ = CountSegments(result);
-      next_look_ = estimate.frame.value + std::max(kFramesBetweenLooks, estimate.frame.value / 10);
+      next_count_ =
+          estimate.frame.value + std::max(kMinFramesBetweenCounts, estimate.frame.value / 10);
     }
     return {std::to_string(estimate.report.num_inliers) + " inliers",
             Counted(num_loops_, "loop"),
@@ -38,15 +40,15 @@ class SlamProgress::Counters {
     return std::to_string(count) + " " + what + (count == 1 ? "" : "s");
   }
 
-  // Stretches on which the camera moves, or does not.
+  // Segments on which the camera moves, or does not.
   std::int64_t CountSegments(const OdometryResult& result) const {
     const RotationMap& cam_from_world = result.cam_from_world;
     std::int64_t count = 0;
     int next = cam_from_world.begin()->first.value;
-    for (const PureRotationSegment& stretch :
+    for (const PureRotationSegment& segment :
          FindPureRotationSegments(result.graph, cam_from_world, options_)) {
-      count += stretch.first.value > next ? 2 : 1;
-      next = stretch.last.value + 1;
+      count += segment.first.value > next ? 2 : 1;
+      next = segment.last.value + 1;
     }
     return count + (cam_from_world.rbegin()->first.value >= next ? 1 : 0);
   }
@@ -54,7 +56,7 @@ class SlamProgress::Counters {
   PureRotationOptions options_;
   std::int64_t num_loops_ = 0;
   std::int64_t num_segments_ = 1;
-  int next_look_ = 29;
+  int next_count_ = 29;  // frame id; the 30th frame
 };
 
 namespace {
@@ -79,12 +81,36 @@ const char* NameOf(SlamStage stage) {
   return "";
 }
 
-// What a copy has cut off is missed by nobody; the odd frame is a container's own miscount.
+// "12, 40-52 and 3 more": the ranges of ids in a set, as many as a line has room for.
+std::string FrameRanges(const std::set<FrameId>& frames) {
+  constexpr int kMaxNamedRanges = 6;  // fit a line of a terminal with the rest of the sentence
+  std::string text;
+  int num_ranges = 0;
+  int num_named = 0;
+  for (auto first = frames.begin(); first != frames.end() && num_ranges < kMaxNamedRanges;
+       ++num_ranges) {
+    auto end = std::next(first);
+    int last = first->value;
+    for (; end != frames.end() && end->value == last + 1; ++end) ++last;
+    num_named += last - first->value + 1;
+    text += (text.empty() ? "" : ", ") + std::to_string(first->value) +
+            (last > first->value ? "-" + std::to_string(last) : std::string());
+    first = end;
+  }
+  const int num_more = static_cast<int>(frames.size()) - num_named;
+  return text + (num_more > 0 ? " and " + std::to_string(num_more) + " more" : std::string());
+}
+
+// A video that was cut off while it was copied still announces all of its frames. Containers
+// miscount by a frame or two, which needs no warning.
 void WarnOfMissingFrames(int num_frames, int num_announced, Progress& progress) {
   const int num_missing = num_announced - num_frames;
   if (num_missing <= std::max(2, num_announced / 100)) return;
-  progress.Warn("the video ends after " + std::to_string(num_frames) + " of the " +
-                std::to_string(num_announced) + " frames it announces; is the file complete?");
+  progress.Warn(
+      "the video ends after " + std::to_string(num_frames) + " of the " +
+      std::to_string(num_announced) +
+      " frames it announces: the file is cut off or damaged. The result covers the frames "
+      "before the end. If you need the rest, copy or export the video again");
 }
 
 void TellDetails(const LoopedEstimate& estimate, Progress& progress) {
@@ -104,37 +130,47 @@ void TellDetails(const LoopedEstimate& estimate, Progress& progress) {
   }
 }
 
-// Loops right round measure the scale of all rotations.
+// A loop along which the camera turned right round measures the scale of all rotations.
 void WarnOfRotationScale(const std::vector<LoopCheck>& loops, Progress& progress) {
+  // Smallest relative error of the rotations that is worth a warning.
   constexpr double kNotable = 0.02;
   const RotationScale scale = RotationScaleOf(loops);
   if (std::abs(scale.factor - 1.0) < kNotable) return;
   const bool is_small = scale.factor > 1.0;
-  std::array<char, 160> text = {};
+  std::array<char, 320> text = {};
   std::snprintf(text.data(),
                 text.size(),
-                "turns around %d closed loops come out %.1f %% too %s: check the focal length, "
-                "which seems too %s",
-                scale.num_loops,
+                "turns around closed loops come out %.1f %% too %s (%d loops): the focal length is "
+                "probably too %s by that share, which bends the path and the map. Calibrate the "
+                "camera (rotslam calibrate), or correct the focal length in the camera file",
                 100.0 * std::abs(scale.factor - 1.0),
                 is_small ? "small" : "large",
+                scale.num_loops,
                 is_small ? "long" : "short");
   progress.Warn(text.data());
 }
 
-void WarnOfInterpolatedFrames(const Orientations& orientations, Progress& progress) {
-  // The unreadable ones have had their warning.
-  const int count = static_cast<int>(orientations.unconnected.size()) - orientations.num_unreadable;
-  if (count <= 0) return;
-  progress.Warn(std::to_string(count) +
-                (count == 1 ? " frame matches no other; its orientation is interpolated"
-                            : " frames match no other; their orientations are interpolated"));
+// @param unreadable  frames that have had a warning of their own.
+void WarnOfInterpolatedFrames(const std::set<FrameId>& unconnected,
+                              const std::set<FrameId>& unreadable,
+                              Progress& progress) {
+  std::set<FrameId> frames = unconnected;
+  for (const FrameId frame : unreadable) frames.erase(frame);
+  if (frames.empty()) return;
+  progress.Warn(std::to_string(frames.size()) +
+                (frames.size() == 1 ? " frame matches no other (" : " frames match no other (") +
+                FrameRanges(frames) +
+                "): blurred, covered or without texture. The orientation there is a guess, "
+                "interpolated between the frames around. If there are many such frames, cut them "
+                "out");
 }
 
 void WarnOfBreaks(const std::vector<FrameId>& breaks, Progress& progress) {
   for (const FrameId frame : breaks) {
     progress.Warn("frame " + std::to_string(frame.value) +
-                  " matches none before it; the turn across this gap is extrapolated");
+                  " matches none before it: the video has a cut there, or the view was lost. How "
+                  "far the camera turned across this gap is a guess, and so is the direction of "
+                  "everything after it. Split the video there and run the parts one by one");
   }
 }
 
@@ -147,7 +183,8 @@ void TellRelocalised(const std::set<FrameId>& frames, Progress& progress) {
     if (count++ < kMaxNamed) names += " " + std::to_string(frame.value);
   }
   if (count > kMaxNamed) names += " and " + std::to_string(count - kMaxNamed) + " more";
-  progress.Say("keyframes found again in another place of the map:" + names);
+  progress.Say("keyframes moved to another place of the map, where their view was recognised:" +
+               names);
 }
 
 void TellCloud(const MapResult& result, double min_angle_deg, Progress& progress) {
@@ -155,7 +192,7 @@ void TellCloud(const MapResult& result, double min_angle_deg, Progress& progress
   std::array<char, 160> text = {};
   std::snprintf(text.data(),
                 text.size(),
-                "%d points; %d seen under less than %g deg and %d that stood alone left out",
+                "%d points; %d seen under less than %g deg and %d isolated ones left out",
                 num_points,
                 result.num_shallow_points,
                 min_angle_deg,
@@ -163,15 +200,17 @@ void TellCloud(const MapResult& result, double min_angle_deg, Progress& progress
   progress.EndStage(text.data());
   const int num_all = num_points + result.num_shallow_points + result.num_cloud_outliers;
   if (num_points > 0 && 2 * num_points >= num_all) return;
-  progress.Warn("the cloud holds " + std::to_string(num_points) + " of " + std::to_string(num_all) +
-                " points: the camera has moved too little for more");
+  progress.Warn(
+      "the cloud holds " + std::to_string(num_points) + " of " + std::to_string(num_all) +
+      " points: the camera has moved too little for more. Depth is seen only from different "
+      "places: walk while you film, best sideways to what you film");
 }
 
 std::string DescribeKeyframes(const MapResult& map) {
   return std::to_string(map.keyframes.size()) + " keyframes, " +
          std::to_string(map.keyframe_tracks.size()) + " tracks, " +
-         std::to_string(map.held.size()) + " pure-rotation segment" +
-         (map.held.size() == 1 ? "" : "s");
+         std::to_string(map.segments.size()) + " pure-rotation segment" +
+         (map.segments.size() == 1 ? "" : "s");
 }
 
 }  // namespace
@@ -194,31 +233,37 @@ void SlamProgress::OnBegin(SlamStage stage, int num_steps) {
 void SlamProgress::OnFrame(const FrameProgress& progress) {
   const Frame& frame = progress.frame;
   if (!frame.problem.empty()) {
-    progress_.Warn("frame " + std::to_string(frame.id.value) +
-                   " skipped, its pose is interpolated: " + frame.problem);
+    unreadable_.insert(frame.id);
+    progress_.Warn("frame " + std::to_string(frame.id.value) + " skipped: " + frame.problem +
+                   ". Its pose is interpolated between its neighbours. If many frames are "
+                   "skipped, copy or export the images again");
   }
   TellDetails(progress.estimate, progress_);
   progress_.Step(frame.id.value + 1, counters_->Update(progress.estimate, progress.odometry));
 }
 
 void SlamProgress::OnReadoutFound(const ReadoutEstimate& readout) {
-  progress_.EndStage("the shutter rolls, read out in " + DescribeReadout(readout));
+  progress_.EndStage("rolling shutter, read out in " + DescribeReadout(readout));
   progress_.Warn(
-      "how the sensor is read out is not known, the images tell it: starts again from the first "
-      "frame with " +
-      CameraLines(readout) + "; in the camera file that spares the second reading");
+      "the camera has a rolling shutter and its readout time was not given, so it was measured "
+      "from "
+      "the images: the run starts again from the first frame with " +
+      CameraLines(readout) + ". Write that into the camera file, and later runs start only once");
 }
 
 void SlamProgress::OnMissingImage(const std::string& problem) {
-  progress_.Warn(problem + "; points are not looked for in images that cannot be read again");
+  progress_.Warn(problem +
+                 ": the image could be read before, and now it cannot. The map is finished without "
+                 "a second look at this image and may have fewer points there. Keep the files in "
+                 "their place until the run has ended");
 }
 
 void SlamProgress::OnFocalPass(int pass, double focal_px) {
   std::array<char, 32> focal = {};
   std::snprintf(focal.data(), focal.size(), "%.1f px", focal_px);
   progress_.Say("pass " + std::to_string(pass) +
-                " over the beginning, for the focal length: from " + focal.data() +
-                (pass == 1 ? ", a guess" : ""));
+                " over the first frames to estimate the focal length, starting from " +
+                focal.data() + (pass == 1 ? " (a guess)" : ""));
 }
 
 void SlamProgress::OnEnd(SlamStage /*stage*/, const Orientations& orientations) {
@@ -231,7 +276,7 @@ void SlamProgress::OnEnd(SlamStage /*stage*/, const Orientations& orientations) 
                   std::to_string(orientations.given->disagreement_deg) +
                   " deg from the edges (median)");
   } else {
-    WarnOfInterpolatedFrames(orientations, progress_);
+    WarnOfInterpolatedFrames(orientations.unconnected, unreadable_, progress_);
   }
   WarnOfRotationScale(orientations.loops, progress_);
   WarnOfBreaks(orientations.breaks, progress_);
@@ -268,7 +313,9 @@ void SlamProgress::OnEnd(SlamStage stage, const MapResult& map) {
 
 bool SlamProgress::ShouldStop() {
   if (!interruption_.IsRequested()) return false;
-  progress_.Say("interrupted: putting together what there is; once more ends at once");
+  progress_.Say(
+      "interrupted: the frames read so far are finished and written; press Ctrl-C once more to end "
+      "at once, without results");
   return true;
 }
 

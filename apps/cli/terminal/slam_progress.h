@@ -1,6 +1,7 @@
 #pragma once
 
 #include <memory>
+#include <set>
 #include <string>
 
 #include "apps/cli/terminal/interruption.h"
@@ -10,7 +11,8 @@
 
 namespace rotslam {
 
-/// Puts into words how the system gets on. All must outlive it.
+/// Writes the progress and the warnings of a run for a person. The constructor's arguments must
+/// outlive it.
 class SlamProgress : public SlamObserver {
  public:
   SlamProgress(const SlamOptions& options, const Interruption& interruption, Progress& progress);
@@ -32,6 +34,7 @@ class SlamProgress : public SlamObserver {
   const Interruption& interruption_;
   Progress& progress_;
   std::unique_ptr<Counters> counters_;  // of the stage at hand
+  std::set<FrameId> unreadable_;        // frames that have had a warning
   int num_announced_ = -1;              // frames
 };
 

@@ -14,7 +14,7 @@ Reconstruction MakeCloudOf(const CloudSources& sources,
   std::erase_if(problem.start.tracks, [&](const Track& track) {
     return static_cast<int>(track.observations.size()) < options.min_observations;
   });
-  for (const PureRotationSegment& segment : sources.held) {
+  for (const PureRotationSegment& segment : sources.segments) {
     for (const auto& [frame, rotation] : sources.cam_from_world) {
       if (segment.first < frame && frame <= segment.last)
         problem.shared_center[frame] = segment.first;

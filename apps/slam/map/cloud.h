@@ -16,11 +16,12 @@ struct CloudSources {
   const Camera& camera;
   const RotationMap& cam_from_world;
   const CenterMap& center_in_world;
-  const PointMap& point_in_world;  // known ones, where triangulation starts
-  const std::vector<PureRotationSegment>& held;
+  const PointMap& point_in_world;  // known points, from which triangulation starts
+  const std::vector<PureRotationSegment>& segments;
 };
 
-/// Points of all tracks, not only the keyframes', from the poses of all frames.
+/// Triangulates the points of all tracks, not only those of the keyframes, from the poses of all
+/// frames.
 Reconstruction MakeCloudOf(const CloudSources& sources,
                            const std::vector<Track>& tracks,
                            const BundleOptions& options);

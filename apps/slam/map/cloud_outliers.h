@@ -28,8 +28,8 @@ struct CloudOutlierOptions {
   }
 };
 
-/// The points that do not stand alone, by PCL's StatisticalOutlierRemoval; all of them when the
-/// options say so or there are not more of them than `num_neighbours`.
+/// Removes isolated points by PCL's StatisticalOutlierRemoval. All points are kept where the
+/// options say so or there are no more than `num_neighbours`.
 /// Throws std::invalid_argument when options.Problem().
 PointMap WithoutOutliers(const PointMap& points, const CloudOutlierOptions& options);
 

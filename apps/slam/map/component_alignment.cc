@@ -15,12 +15,12 @@
 namespace rotslam {
 namespace {
 
-// How many frames on each side of a boundary tell what it is like there.
+// Frames on each side of a boundary from which scale and place are computed: one second of video.
 constexpr int kBoundaryFrames = 30;
 
 using Path = std::vector<std::pair<FrameId, Eigen::Vector3d>>;
 
-// Keyframes within kBoundaryFrames of the last (or first) one, two at least, from there on.
+// Keyframes within kBoundaryFrames of the last (or first) one, at least two.
 Path CentersAtBoundary(const CenterMap& centers, bool at_end) {
   Path path(centers.begin(), centers.end());
   if (at_end) std::reverse(path.begin(), path.end());
@@ -51,7 +51,7 @@ Eigen::Vector3d VelocityAtBoundary(const CenterMap& centers,
   return Median(std::move(speeds)) * direction;
 }
 
-// Median distance of the points that the keyframes at the boundary see; zero where they see none.
+// Median distance of the points seen by the keyframes at the boundary; zero where they see none.
 double DepthAtBoundary(const Reconstruction& map, const CenterMap& centers, bool at_end) {
   const Path path = CentersAtBoundary(centers, at_end);
   const CenterMap center_at_boundary(path.begin(), path.end());
@@ -68,7 +68,8 @@ double DepthAtBoundary(const Reconstruction& map, const CenterMap& centers, bool
   return Median(std::move(depths));
 }
 
-// Frames that stand near a boundary between two, as one map has them or its points tell.
+// Centres of the frames near the boundary between two frames: those of the map, or resected against
+// its points.
 CenterMap CentersAround(FrameId one,
                         FrameId other,
                         const Reconstruction& map,
@@ -101,7 +102,7 @@ CenterMap CentersAround(FrameId one,
   return centers;
 }
 
-// From `from` to `to`, by the median over the frames that have both, each axis for itself.
+// Translation from `from` to `to`: the median over the frames that have both, for each axis.
 std::optional<Eigen::Vector3d> MedianStep(const CenterMap& from, const CenterMap& to) {
   std::array<std::vector<double>, 3> steps;
   for (const auto& [frame, center] : from) {
@@ -115,7 +116,8 @@ std::optional<Eigen::Vector3d> MedianStep(const CenterMap& from, const CenterMap
   return Eigen::Vector3d(Median(steps[0]), Median(steps[1]), Median(steps[2]));
 }
 
-// From the frame of `from` that is nearest in time to one of `to`, to where that path has it.
+// Translation from the frame of `from` that is nearest in time to one of `to`, to the position on
+// the path `to` at that time.
 Eigen::Vector3d StepInTime(const CenterMap& from,
                            const CenterMap& to,
                            const std::vector<double>& timestamps_s) {
@@ -155,7 +157,7 @@ Similarity AlignComponent(const Reconstruction& placed,
   std::erase_if(earlier, [&](const auto& entry) {
     return entry.first >= part.center_in_world.begin()->first;
   });
-  // The part may begin before all that is placed.
+  // The part may lie before all components placed so far.
   const bool is_behind = !earlier.empty();
   if (!is_behind) earlier = placed.center_in_world;
   const FrameId last = is_behind ? earlier.rbegin()->first : earlier.begin()->first;
@@ -169,8 +171,8 @@ Similarity AlignComponent(const Reconstruction& placed,
   if (before > 0.0 && after > 0.0) similarity.scale = before / after;
 
   const Reconstruction scaled = Moved(part, similarity);
-  const PureRotationSegment* stretch = SegmentAt(sources.held, first);
-  if (stretch != nullptr && SegmentAt(sources.held, last) == stretch) {
+  const PureRotationSegment* segment = SegmentAt(sources.segments, first);
+  if (segment != nullptr && SegmentAt(sources.segments, last) == segment) {
     similarity.shift = placed.center_in_world.at(last) - scaled.center_in_world.at(first);
     return similarity;
   }

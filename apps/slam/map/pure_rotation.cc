@@ -16,31 +16,33 @@
 namespace rotslam {
 namespace {
 
-// Tracks that tell whether it is worth while to look at all of them.
+// Tracks of the sample that is tested before all tracks are.
 constexpr std::size_t kSampledTracks = 2000;
-// Smallest mean square of residuals, in sigmas, that tells anything: 0.01 of a sigma.
+// Lower bound of the mean squared residual, in sigmas squared, so that perfect data have finite
+// evidence.
 constexpr double kLeastVariance = 1e-4;
-// Of all measurements, what a believable explanation passes.
+// Share of all measurements that an accepted pure rotation must explain.
 constexpr double kMinShare = 0.25;
-// Of all observations, what a model explains whose residuals tell how good it is: positions and
-// points explain 0.80 and more of what a moving camera sees, 0.4 to 0.6 of a tripod's turn.
+// Share of the observations that positions and points must explain for their residuals to count as
+// evidence. Of a moving camera they explain 0.80 and more, of a rotating tripod 0.4 to 0.6.
 constexpr double kMostObservations = 2.0 / 3.0;
-// A sample may explain this much less than is asked for: it has fewer observations to find the
-// lens with.
+// Thresholds for the sample are lower by this factor, since it has fewer observations to estimate
+// the lens from.
 constexpr double kSampleShare = 0.8;
-// No calibration, guessed or not, is wrong by more than this factor.
+// Largest factor between the given and the estimated focal length; guesses are better than that.
 constexpr double kMaxFocalFactor = 2.0;
-// Pairs of views that tell whether the camera moves, and the share of them without a baseline that
-// a turn has at least.
+// Pairs of views tested for a baseline, and the smallest share of them without one in a pure
+// rotation.
 constexpr std::size_t kSampledEdges = 100;
 constexpr double kMinShareWithoutBaseline = 0.05;
-// The share of them that a turn in place has at least, seen through the lens found for it.
+// The smallest share of them without a baseline in a pure rotation, with the lens estimated for it.
 constexpr double kInPlaceShareWithoutBaseline = 0.9;
-// What such a lens still has wrong, as BaselineTestOptions::lens_error.
+// Remaining error of the estimated lens, see BaselineTestOptions::lens_error.
 constexpr double kFoundLensError = 1e-4;
-// A calibration is no farther off than so many times BaselineTestOptions::lens_error.
+// Largest relative error of a calibrated focal length, as a multiple of
+// BaselineTestOptions::lens_error.
 constexpr double kCredibleErrors = 3.0;
-// Frames of a turn that tell its lens.
+// Frames from which the lens of a segment is estimated; more add time and little accuracy.
 constexpr std::size_t kMaxLensFrames = 100;
 
 bool IsLensCredible(const Camera& given, const Camera& refined) {
@@ -48,7 +50,7 @@ bool IsLensCredible(const Camera& given, const Camera& refined) {
   return factor <= kMaxFocalFactor && factor >= 1.0 / kMaxFocalFactor;
 }
 
-// Evenly over all of them.
+// Elements at equal steps, at most `max_size`.
 template <class T>
 std::vector<T> SampleOf(const std::vector<T>& all, std::size_t max_size) {
   const std::size_t stride = (all.size() + max_size - 1) / max_size;
@@ -90,51 +92,51 @@ std::vector<BearingPair> PairsOf(const RelativeRotation& edge,
   return pairs;
 }
 
-// Pairs of views asked for a baseline, and those that show none.
-struct PairVotes {
-  int asked = 0;
+// Number of pairs of views tested for a baseline, and of those that show none.
+struct BaselineVotes {
+  int tested = 0;
   int without = 0;
 };
 
-PairVotes AskPairs(const std::vector<RelativeRotation>& edges,
-                   const std::vector<Track>& tracks,
-                   double focal_px,
-                   const RelativeRotationOptions& options) {
+BaselineVotes TestPairs(const std::vector<RelativeRotation>& edges,
+                        const std::vector<Track>& tracks,
+                        double focal_px,
+                        const RelativeRotationOptions& options) {
   constexpr std::uint64_t kSeed = 1;
   const std::vector<RelativeRotation> sample = SampleOf(edges, kSampledEdges);
   const ObservationsOfFrames observations = ObservationsOf(sample, tracks);
-  PairVotes votes;
+  BaselineVotes votes;
   for (const RelativeRotation& edge : sample) {
     const auto estimate = EstimateRelativeRotation(
         PairsOf(edge, observations), edge.j_from_i, focal_px, options, kSeed);
     if (!estimate) continue;
-    ++votes.asked;
+    ++votes.tested;
     votes.without += estimate->rotation_only ? 1 : 0;
   }
   return votes;
 }
 
-// Whether the camera rests for most of the segment.
-bool IsRest(const PureRotationSegment& stretch) {
+// Whether the camera is at rest for most of the segment.
+bool IsAtRest(const PureRotationSegment& segment) {
   int num_still = 0;
-  for (const FrameRange& still : stretch.still)
+  for (const FrameRange& still : segment.still)
     num_still += still.last.value - still.first.value + 1;
-  return 2 * num_still > stretch.last.value - stretch.first.value + 1;
+  return 2 * num_still > segment.last.value - segment.first.value + 1;
 }
 
-RotationMap RotationsOf(const PureRotationSegment& stretch, const RotationMap& cam_from_world) {
-  return RotationMap(cam_from_world.find(stretch.first), cam_from_world.upper_bound(stretch.last));
+RotationMap RotationsOf(const PureRotationSegment& segment, const RotationMap& cam_from_world) {
+  return RotationMap(cam_from_world.find(segment.first), cam_from_world.upper_bound(segment.last));
 }
 
-// The segment and what is before and behind it, as long as the camera turns the same way there, and
-// at least half as fast as is usual in it.
-RotationMap WholeTurn(const PureRotationSegment& stretch, const RotationMap& cam_from_world) {
+// Orientations of the segment and of the frames before and after it, as far as the camera goes on
+// rotating in the same direction at half the median rate of the segment or faster.
+RotationMap WholeRotation(const PureRotationSegment& segment, const RotationMap& cam_from_world) {
   using Frame = RotationMap::const_iterator;
   const auto step = [](Frame from) -> Eigen::Vector3d {
     return (std::next(from)->second * from->second.Inverse()).Log();
   };
-  Frame first = cam_from_world.find(stretch.first);
-  Frame last = cam_from_world.find(stretch.last);
+  Frame first = cam_from_world.find(segment.first);
+  Frame last = cam_from_world.find(segment.last);
   Eigen::Vector3d sum = Eigen::Vector3d::Zero();
   for (Frame frame = first; frame != last; ++frame) sum += step(frame);
   const Eigen::Vector3d axis = sum.normalized();
@@ -147,11 +149,12 @@ RotationMap WholeTurn(const PureRotationSegment& stretch, const RotationMap& cam
   return RotationMap(first, std::next(last));
 }
 
-// Rotations, directions and lens of a turn in place by some of its frames and tracks.
-PureRotationResult RefineTurnAndLens(const Camera& camera,
-                                     const RotationMap& turn,
-                                     const std::vector<Track>& tracks,
-                                     BundleOptions options) {
+// Estimates rotations, directions and lens of a pure rotation from a sample of its frames and
+// tracks.
+PureRotationResult RefineRotationAndLens(const Camera& camera,
+                                         const RotationMap& turn,
+                                         const std::vector<Track>& tracks,
+                                         BundleOptions options) {
   std::vector<FrameId> frames;
   for (const auto& [frame, rotation] : turn) frames.push_back(frame);
   frames = SampleOf(frames, kMaxLensFrames);
@@ -164,27 +167,27 @@ PureRotationResult RefineTurnAndLens(const Camera& camera,
   return RefinePureRotation(camera, rotations, SampleOf(seen, kSampledTracks), options);
 }
 
-// What a turn looks like through the lens that suits it best.
-struct TurnThroughLens {
-  bool is_another = false;      // than the given one, which suits it less
-  bool is_credible = true;      // as near to it as a calibration should be
-  bool shows_baseline = false;  // to more pairs than a turn in place
+// A rotation seen with the lens that fits it best.
+struct RotationThroughLens {
+  bool is_another = false;      // that lens fits better than the given one
+  bool is_credible = true;      // its focal length is within the error of a calibration
+  bool shows_baseline = false;  // more pairs have a baseline than in a pure rotation
 };
 
-TurnThroughLens LookThroughItsLens(const RotationMap& turn,
-                                   const RotationSources& sources,
-                                   RelativeRotationOptions options,
-                                   const BundleOptions& bundle_options) {
+RotationThroughLens TestWithBestLens(const RotationMap& turn,
+                                     const RotationSources& sources,
+                                     RelativeRotationOptions options,
+                                     const BundleOptions& bundle_options) {
   std::set<FrameId> frames;
   for (const auto& [frame, rotation] : turn) frames.insert(frame);
   std::vector<Track> tracks = RestrictTracks(sources.tracks, frames, 3);
   const PureRotationResult in_place =
-      RefineTurnAndLens(sources.camera, turn, tracks, bundle_options);
+      RefineRotationAndLens(sources.camera, turn, tracks, bundle_options);
   if (!in_place.Usable() || !in_place.lens_refined) return {};
 
   std::vector<RelativeRotation> edges;
   for (const RelativeRotation& edge : sources.graph.edges()) {
-    // Neighbours show the least of a baseline.
+    // Neighbouring frames have the shortest baselines, which are hard to detect.
     const bool are_neighbours = edge.j.value - edge.i.value == 1;
     if (!are_neighbours && frames.contains(edge.i) && frames.contains(edge.j)) {
       edges.push_back(edge);
@@ -193,25 +196,25 @@ TurnThroughLens LookThroughItsLens(const RotationMap& turn,
   tracks = WithBearingsOf(in_place.camera, std::move(tracks));
   const double credible_change = kCredibleErrors * options.baseline.lens_error;
   options.baseline.lens_error = kFoundLensError;
-  const PairVotes votes = AskPairs(edges, tracks, in_place.camera.MeanFocal(), options);
+  const BaselineVotes votes = TestPairs(edges, tracks, in_place.camera.MeanFocal(), options);
   const double change = std::abs(in_place.camera.MeanFocal() / sources.camera.MeanFocal() - 1.0);
   return {
-      true, change <= credible_change, votes.without < kInPlaceShareWithoutBaseline * votes.asked};
+      true, change <= credible_change, votes.without < kInPlaceShareWithoutBaseline * votes.tested};
 }
 
-// The whole turn that the segment is a part of, where the camera stands off its axis.
-std::optional<FrameRange> OffAxisRotation(const PureRotationSegment& stretch,
+// The frames of the whole rotation around the segment, where the camera is off its axis.
+std::optional<FrameRange> OffAxisRotation(const PureRotationSegment& segment,
                                           const RotationSources& sources,
                                           const RelativeRotationOptions& options,
                                           const BundleOptions& bundle_options) {
-  if (IsRest(stretch)) return std::nullopt;
-  const auto look = [&](const RotationMap& turn) {
-    return LookThroughItsLens(turn, sources, options, bundle_options);
+  if (IsAtRest(segment)) return std::nullopt;
+  const auto test = [&](const RotationMap& turn) {
+    return TestWithBestLens(turn, sources, options, bundle_options);
   };
-  const TurnThroughLens alone = look(RotationsOf(stretch, sources.cam_from_world));
+  const RotationThroughLens alone = test(RotationsOf(segment, sources.cam_from_world));
   if (!alone.is_another) return std::nullopt;
-  const RotationMap whole = WholeTurn(stretch, sources.cam_from_world);
-  if (!alone.shows_baseline && (alone.is_credible || !look(whole).shows_baseline)) {
+  const RotationMap whole = WholeRotation(segment, sources.cam_from_world);
+  if (!alone.shows_baseline && (alone.is_credible || !test(whole).shows_baseline)) {
     return std::nullopt;
   }
   return FrameRange{whole.begin()->first, whole.rbegin()->first};
@@ -232,13 +235,13 @@ Explanation ExplanationBy(const std::vector<BundleSummary>& bundles) {
   return sum;
 }
 
-Explanation ExplanationBy(const PureRotationResult& turning) {
+Explanation ExplanationBy(const PureRotationResult& rotation) {
   const int num_free =
-      2 * turning.num_directions + 3 * static_cast<int>(turning.cam_from_world.size());
-  return {.num_observations = turning.num_observations,
-          .num_tracks = turning.num_directions,
-          .redundancy = 2 * turning.num_observations - num_free,
-          .cost = turning.final_cost};
+      2 * rotation.num_directions + 3 * static_cast<int>(rotation.cam_from_world.size());
+  return {.num_observations = rotation.num_observations,
+          .num_tracks = rotation.num_directions,
+          .redundancy = 2 * rotation.num_observations - num_free,
+          .cost = rotation.final_cost};
 }
 
 double Evidence(const Explanation& explanation, double limit) {
@@ -260,10 +263,11 @@ std::optional<PureRotationResult> DetectPureRotation(const Camera& camera,
   const bool residuals_tell = moving.num_observations >= kMostObservations * num_given;
   const double limit = residuals_tell ? options.fine.max_error_px : 0.0;
   const double evidence_of_moving = Evidence(moving, limit);
-  // Whether a turn of `share` of all observations passes enough checks, and more than movement.
-  const auto is_believable = [&](const PureRotationResult& turning, double share) {
-    const Explanation explanation = ExplanationBy(turning);
-    return turning.Usable() && IsLensCredible(camera, turning.camera) &&
+  // Whether a pure rotation fitted to `share` of all observations passes enough checks, and has
+  // more evidence than positions and points.
+  const auto is_accepted = [&](const PureRotationResult& rotation, double share) {
+    const Explanation explanation = ExplanationBy(rotation);
+    return rotation.Usable() && IsLensCredible(camera, rotation.camera) &&
            explanation.redundancy > share * kMinShare * 2 * num_given &&
            Evidence(explanation, limit) > share * evidence_of_moving;
   };
@@ -271,41 +275,42 @@ std::optional<PureRotationResult> DetectPureRotation(const Camera& camera,
   if (sample.size() < tracks.size()) {
     const double share = static_cast<double>(NumObservations(sample)) / num_given;
     const PureRotationResult sampled = RefinePureRotation(camera, cam_from_world, sample, options);
-    if (!is_believable(sampled, kSampleShare * share)) return std::nullopt;
+    if (!is_accepted(sampled, kSampleShare * share)) return std::nullopt;
   }
-  PureRotationResult turning = RefinePureRotation(camera, cam_from_world, tracks, options);
-  // Through the lens they were asked through pairs of views know better, but where nothing came of
-  // what they say.
+  PureRotationResult rotation = RefinePureRotation(camera, cam_from_world, tracks, options);
+  // With the given lens the tests of pairs of views are more reliable than this one. They count
+  // unless they led to no map.
   const bool has_map = moving.num_observations > 0;
-  if (has_map && !turning.lens_refined) return std::nullopt;
-  if (!is_believable(turning, 1.0)) return std::nullopt;
-  return turning;
+  if (has_map && !rotation.lens_refined) return std::nullopt;
+  if (!is_accepted(rotation, 1.0)) return std::nullopt;
+  return rotation;
 }
 
 bool PairsAllowPureRotation(const ViewGraph& graph,
                             const std::vector<Track>& tracks,
                             double focal_px,
                             const RelativeRotationOptions& options) {
-  const PairVotes votes = AskPairs(graph.edges(), tracks, focal_px, options);
-  return votes.without >= kMinShareWithoutBaseline * votes.asked;
+  const BaselineVotes votes = TestPairs(graph.edges(), tracks, focal_px, options);
+  return votes.without >= kMinShareWithoutBaseline * votes.tested;
 }
 
-std::vector<PureRotationSegment> WithoutOffAxisRotations(std::vector<PureRotationSegment> held,
+std::vector<PureRotationSegment> WithoutOffAxisRotations(std::vector<PureRotationSegment> segments,
                                                          const RotationSources& sources,
                                                          const RelativeRotationOptions& options,
                                                          const BundleOptions& bundle_options) {
-  std::vector<FrameRange> arms;
-  for (const PureRotationSegment& stretch : held) {
-    if (const auto turn = OffAxisRotation(stretch, sources, options, bundle_options)) {
-      arms.push_back(*turn);
+  std::vector<FrameRange> off_axis;
+  for (const PureRotationSegment& segment : segments) {
+    if (const auto turn = OffAxisRotation(segment, sources, options, bundle_options)) {
+      off_axis.push_back(*turn);
     }
   }
-  std::erase_if(held, [&](const PureRotationSegment& stretch) {
-    return !IsRest(stretch) && std::any_of(arms.begin(), arms.end(), [&](const FrameRange& turn) {
-      return stretch.first <= turn.last && turn.first <= stretch.last;
-    });
+  std::erase_if(segments, [&](const PureRotationSegment& segment) {
+    return !IsAtRest(segment) &&
+           std::any_of(off_axis.begin(), off_axis.end(), [&](const FrameRange& turn) {
+             return segment.first <= turn.last && turn.first <= segment.last;
+           });
   });
-  return held;
+  return segments;
 }
 
 }  // namespace rotslam

@@ -51,7 +51,7 @@ std::size_t LargestComponent(const std::vector<MapComponent>& components,
 
 }  // namespace
 
-BundleOptions WithLensHeld(BundleOptions options) {
+BundleOptions WithFixedLens(BundleOptions options) {
   options.lens.refine_focal = options.lens.refine_distortion = false;
   options.lens.refine_principal_point = false;
   return options;
@@ -61,7 +61,7 @@ BundleResult RefineComponent(const MapComponent& component,
                              const RotationMap& cam_from_world,
                              const CenterMap& center_in_world,
                              const std::vector<Track>& tracks,
-                             const std::vector<PureRotationSegment>& held,
+                             const std::vector<PureRotationSegment>& segments,
                              const Camera& camera,
                              const BundleOptions& options,
                              const TrackCompletion& complete) {
@@ -71,9 +71,9 @@ BundleResult RefineComponent(const MapComponent& component,
     problem.start.cam_from_world[frame] = cam_from_world.at(frame);
     problem.start.center_in_world[frame] = center_in_world.at(frame);
   }
-  for (const PureRotationSegment& stretch : held) {
-    if (component.keyframes.contains(stretch.first) && component.keyframes.contains(stretch.last)) {
-      problem.shared_center[stretch.last] = stretch.first;
+  for (const PureRotationSegment& segment : segments) {
+    if (component.keyframes.contains(segment.first) && component.keyframes.contains(segment.last)) {
+      problem.shared_center[segment.last] = segment.first;
     }
   }
   problem.start.tracks = RestrictTracks(tracks, component.keyframes, 2);
@@ -93,7 +93,7 @@ std::vector<Track> WithBearingsOf(const Camera& camera, std::vector<Track> track
 RefinedComponents RefineComponents(const RotationMap& cam_from_world,
                                    const KrotSolution& krot,
                                    const std::vector<Track>& tracks,
-                                   const std::vector<PureRotationSegment>& held,
+                                   const std::vector<PureRotationSegment>& segments,
                                    const Camera& camera,
                                    const BundleOptions& options,
                                    const TrackCompletion& complete) {
@@ -108,7 +108,7 @@ RefinedComponents RefineComponents(const RotationMap& cam_from_world,
                                              cam_from_world,
                                              krot.center_in_world,
                                              seen,
-                                             held,
+                                             segments,
                                              refined.camera,
                                              bundle_options,
                                              complete);
@@ -117,7 +117,7 @@ RefinedComponents RefineComponents(const RotationMap& cam_from_world,
   refine(first, tracks, options);
   refined.camera = refined.bundles[first].camera;
   if (refined.components.size() == 1) return refined;
-  const BundleOptions same_lens = WithLensHeld(options);
+  const BundleOptions same_lens = WithFixedLens(options);
   const std::vector<Track> seen = WithBearingsOf(refined.camera, tracks);
   for (std::size_t k = 0; k < refined.components.size(); ++k) {
     if (k != first) refine(k, seen, same_lens);

@@ -13,7 +13,7 @@ namespace rotslam {
 /// Keyframes whose relative scale is known: they share tracks with depth.
 struct MapComponent {
   std::set<FrameId> keyframes;
-  bool placed_by_default = false;  // its scale and place rest on continuity, not on measurements
+  bool placed_by_default = false;  // scale and place are assumed by continuity, not measured
 };
 
 /// The components of a known-rotation solution, each refined in its own scale.
@@ -28,25 +28,25 @@ BundleResult RefineComponent(const MapComponent& component,
                              const RotationMap& cam_from_world,
                              const CenterMap& center_in_world,
                              const std::vector<Track>& tracks,
-                             const std::vector<PureRotationSegment>& held,
+                             const std::vector<PureRotationSegment>& segments,
                              const Camera& camera,
                              const BundleOptions& options,
                              const TrackCompletion& complete);
 
-/// The options with the lens left as it is.
-BundleOptions WithLensHeld(BundleOptions options);
+/// The options with the lens fixed.
+BundleOptions WithFixedLens(BundleOptions options);
 
 /// Bundle adjustment of every component from its known-rotation positions. The component with the
-/// most observations refines the lens, as far as the options let it, and the others take it over.
+/// most observations refines the lens, as far as the options let it; the others use that lens.
 /// @param cam_from_world  of every view that the solution has placed.
-/// @param tracks          those that the solution was found from; all are judged anew.
-/// @param held            segments without movement: where both ends are keyframes of a component
-///                        they share a centre.
+/// @param tracks  the input of the known-rotation problem; its outliers are classified anew.
+/// @param segments  pure-rotation segments: where both ends are keyframes of a component they share
+///                  a centre.
 /// @param complete        as RefineBundle takes it.
 RefinedComponents RefineComponents(const RotationMap& cam_from_world,
                                    const KrotSolution& krot,
                                    const std::vector<Track>& tracks,
-                                   const std::vector<PureRotationSegment>& held,
+                                   const std::vector<PureRotationSegment>& segments,
                                    const Camera& camera,
                                    const BundleOptions& options,
                                    const TrackCompletion& complete = nullptr);

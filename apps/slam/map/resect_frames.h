@@ -10,15 +10,15 @@
 
 namespace rotslam {
 
-/// Position between the nearest frames that have one, linear in time; before the first and behind
-/// the last, theirs.
+/// Position interpolated linearly in time between the nearest frames that have one; before the
+/// first and after the last of them, the position of that frame.
 /// @param centers  at least one.
 Eigen::Vector3d InterpolatedCenter(const CenterMap& centers,
                                    const std::vector<double>& timestamps_s,
                                    FrameId frame);
 
-/// Poses of frames by the points of a map that they see; without those that ResectFrame fails for.
-/// @param tracks  of the frames, those of the points among them.
+/// Resects frames against the points of a map. Frames for which ResectFrame fails are left out.
+/// @param tracks  of the frames; must include the tracks of the points.
 std::map<FrameId, ResectedPose> ResectFrames(const std::map<FrameId, ResectionStart>& starts,
                                              const PointMap& points,
                                              const std::vector<Track>& tracks,

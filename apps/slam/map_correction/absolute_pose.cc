@@ -13,10 +13,10 @@ namespace rotslam {
 namespace {
 
 constexpr int kMaxTriples = 1000;
-// Chance that no triple of inliers was among those tried.
+// Probability of having drawn no triple of inliers at which sampling stops.
 constexpr double kMissed = 1e-3;
 
-// In front of the camera, at depth one.
+// A sighting and its ray, on the plane at depth one.
 struct Seen {
   const PointSighting* sighting = nullptr;
   Eigen::Vector2d at;

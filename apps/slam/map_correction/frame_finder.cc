@@ -11,9 +11,9 @@
 namespace rotslam {
 namespace {
 
-// Frames that have fewer points in common are no neighbours.
+// Neighbours see at least this many points in common.
 constexpr int kMinCommonPoints = 15;
-// Of the frame that looks alike, asked as well.
+// Neighbours of the match whose points are used as well.
 constexpr int kMaxNeighbours = 4;
 
 }  // namespace
@@ -107,7 +107,8 @@ std::optional<FoundFrame> FrameFinder::Find(const Lookalike& pair) const {
 
 std::optional<FoundFrame> FrameFinder::FindByTracks(FrameId frame,
                                                     const std::vector<Sighted>& points) const {
-  // The tracks that lead a frame astray are among those that it is asked of.
+  // Largest share of the inliers of the found pose that the present pose may explain. The tracks
+  // that caused a wrong pose are among those tested, so more than that is no contradiction.
   constexpr double kMaxPresentShare = 0.5;
   std::optional<FoundFrame> found = FindPose(frame, MapOf(frame), points);
   if (!found || !found->is_displaced) return std::nullopt;
@@ -136,9 +137,9 @@ ResectionStart FrameFinder::PresentPose(FrameId frame) const {
 }
 
 std::optional<TrackId> FrameFinder::PointAt(FrameId frame, const Eigen::Vector2d& px) const {
-  constexpr double kReachPx = 1.5;
+  constexpr double kMaxDistancePx = 1.5;  // of a corner detected again from its keypoint
   std::optional<TrackId> nearest;
-  double least = kReachPx;
+  double least = kMaxDistancePx;
   const auto seen = seen_.find(frame);
   if (seen == seen_.end()) return nearest;
   for (const Sighted& sighted : seen->second) {
@@ -161,7 +162,7 @@ void FrameFinder::Recognise(FrameId frame, FrameId match, std::vector<Sighted>& 
     const auto point = PointAt(match, from.keypoints_px[pair.i.value]);
     if (!point) continue;
     const Sighted one = {*point, to.keypoints_px[pair.j.value]};
-    // Neighbours see the same.
+    // Neighbours match some of the same points.
     const bool is_known = std::any_of(recognised.begin(), recognised.end(), [&](const auto& other) {
       return other.track == one.track && other.keypoint_px == one.keypoint_px;
     });
@@ -211,7 +212,7 @@ void FrameFinder::Compare(const std::vector<Sighted>& points,
                           const std::vector<PointSighting>& sightings,
                           const ResectedPose& pose,
                           FoundFrame& found) const {
-  constexpr double kRightShare = 0.8;
+  constexpr double kRightShare = 0.8;  // of the found pose's inliers, if the present one is right
   const ResectionStart present = PresentPose(found.frame);
   const ResectionStart now = {pose.cam_from_world, pose.center_in_world, std::nullopt};
   const std::vector<TrackId>& own = PointsOf(found.frame);
@@ -232,7 +233,7 @@ void FrameFinder::Describe(const ResectedPose& pose,
                            const std::vector<Sighted>& points,
                            const std::vector<PointSighting>& sightings,
                            FoundFrame& found) const {
-  constexpr int kMinRatios = 5;
+  constexpr int kMinRatios = 5;  // of depths, for a median that tolerates two outliers
   const ResectionStart present = PresentPose(found.frame);
   const ResectionStart now = {pose.cam_from_world, pose.center_in_world, std::nullopt};
   const Reconstruction& map = *maps_[MapOf(found.frame)];

@@ -16,67 +16,69 @@
 
 namespace rotslam {
 
-// Poses of a map's frames, found anew. Relocalise's own.
+// Finds poses of a map's frames from points of the same or another map. Used by Relocalise only.
 
-// A point, and where a frame shows it or seems to.
+// A point and its keypoint, or supposed keypoint, in a frame.
 struct Sighted {
   TrackId track;
   Eigen::Vector2d keypoint_px;
 };
 
-// A frame's pose against known points.
+// A pose of a frame found from known points.
 struct FoundFrame {
   FrameId frame;
-  std::optional<FrameId> match;  // that sees the points; none: several that the frame's tracks name
-  bool by_neighbours = false;    // of the match, which see the points, too
+  std::optional<FrameId>
+      match;                   // the frame that sees the points; none: found by the frame's tracks
+  bool by_neighbours = false;  // points of the match's neighbours were used, too
   int num_inliers = 0;
-  int num_present = 0;  // that the frame's present pose explains
-  // Of points that the map does not show in the frame: where these are is not its own doing.
+  int num_present = 0;  // sightings that the frame's present pose explains
+  // Explained sightings of points that the map does not observe in this frame, so that the frame
+  // has not contributed to their positions.
   int num_agreeing = 0;
   bool is_displaced = false;  // the present pose explains too little
-  bool is_right = false;      // it explains as much, also of points that the frame is not tied to
-  bool is_near = false;       // it explains more of those than chance does; so it does where right
+  bool is_right = false;      // it explains as many, also among points not observed in the frame
+  bool is_near = false;       // it explains more of those than chance would; implied by is_right
   Similarity move;            // of the frame's surroundings, into the world of the points
   std::vector<std::pair<TrackId, Observation>> sightings;
 };
 
 class FrameFinder {
  public:
-  // As Relocalise takes them; they must outlive it.
+  // The arguments of Relocalise; they must outlive this object.
   FrameFinder(const std::vector<const Reconstruction*>& maps,
               PlaceMatches& places,
               const Camera& camera,
               const RelocalisationOptions& options,
               std::uint64_t seed);
 
-  // Of a frame that one of the maps has a pose of.
+  // Index of the map that holds the frame.
   int MapOf(FrameId frame) const { return map_of_.at(frame); }
 
-  // Those that the frame sees, ascending.
+  // Points that the frame sees, ascending.
   const std::vector<TrackId>& PointsOf(FrameId frame) const;
-  // That two frames of one map see.
+  // Number of points that two frames of one map both see.
   int CountCommon(FrameId a, FrameId b) const;
 
   // Whether both frames have poses and described corners.
   bool IsOpen(const Lookalike& pair) const;
 
-  // Other places of its map, those first that see most of the same points.
+  // Other places of the frame's map, ordered by the number of common points, largest first.
   std::vector<FrameId> NeighboursOf(FrameId frame) const;
 
-  // The pair's frame against the points that the match sees; where these are too few, against those
-  // that its neighbours see, too.
+  // Finds the pose of the pair's frame from the points that the match sees; where these are too
+  // few, from those of the match's neighbours as well.
   std::optional<FoundFrame> Find(const Lookalike& pair) const;
 
-  // By frame: where tracks show points that two other frames see.
+  // By frame: keypoints of its tracks whose points two other frames see.
   std::map<FrameId, std::vector<Sighted>> PointsOfTracks(const std::vector<Track>& tracks) const;
 
-  // A frame against such points; only where it is displaced.
+  // Finds the pose of a frame from such points; nullopt unless the frame is displaced.
   std::optional<FoundFrame> FindByTracks(FrameId frame, const std::vector<Sighted>& points) const;
 
  private:
   ResectionStart PresentPose(FrameId frame) const;
   std::optional<TrackId> PointAt(FrameId frame, const Eigen::Vector2d& px) const;
-  // Adds corners of the frame that look like points which the match sees.
+  // Adds corners of the frame whose descriptors match those of points that the match sees.
   void Recognise(FrameId frame, FrameId match, std::vector<Sighted>& recognised) const;
   std::vector<PointSighting> SightingsOf(int map, const std::vector<Sighted>& points) const;
   bool Explains(const ResectionStart& pose, const PointSighting& sighting) const;
@@ -84,13 +86,13 @@ class FrameFinder {
   std::optional<FoundFrame> FindPose(FrameId frame,
                                      int map,
                                      const std::vector<Sighted>& points) const;
-  // What the present pose explains beside that.
+  // Counts what the present pose explains, and sets the flags of `found`.
   void Compare(const std::vector<Sighted>& points,
                const std::vector<PointSighting>& sightings,
                const ResectedPose& pose,
                FoundFrame& found) const;
-  // What the pose says of the frame's surroundings: they move with it, and their depths say how
-  // much larger they become.
+  // Sets the similarity that moves the frame and its surroundings into the world of the points. The
+  // scale follows from the depths of the points in both maps.
   void Describe(const ResectedPose& pose,
                 int map_of_points,
                 const std::vector<Sighted>& points,

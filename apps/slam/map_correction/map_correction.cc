@@ -9,7 +9,7 @@
 namespace rotslam {
 namespace {
 
-// A frame and those next to it.
+// A frame and the two frames of the map on each side of it.
 template <class Value>
 std::set<FrameId> Around(FrameId frame, const std::map<FrameId, Value>& frames) {
   constexpr int kAround = 2;
@@ -22,16 +22,16 @@ std::set<FrameId> Around(FrameId frame, const std::map<FrameId, Value>& frames) 
   return around;
 }
 
-// Those that have moved, and those next to them.
-std::set<FrameId> DoubtfulFrames(const RelocalisedMap& map) {
-  std::set<FrameId> doubtful;
-  for (const FrameId frame : map.moved) doubtful.merge(Around(frame, map.center_in_world));
-  return doubtful;
+// Frames that have moved, and their neighbours, which may be displaced as well.
+std::set<FrameId> FramesToCheck(const RelocalisedMap& map) {
+  std::set<FrameId> to_check;
+  for (const FrameId frame : map.moved) to_check.merge(Around(frame, map.center_in_world));
+  return to_check;
 }
 
-// Describes the doubtful frames that are no places yet; whether there are any.
-bool DescribeDoubtful(const RelocalisedMap& map, MapCorrectionSources& sources) {
-  std::set<FrameId> frames = DoubtfulFrames(map);
+// Describes the frames to check that are no places yet. Returns whether there are any.
+bool DescribeFramesToCheck(const RelocalisedMap& map, MapCorrectionSources& sources) {
+  std::set<FrameId> frames = FramesToCheck(map);
   std::erase_if(frames, [&](FrameId frame) { return sources.places.contains(frame); });
   if (frames.empty() || !sources.describe) return false;
   Reconstruction poses;
@@ -41,10 +41,10 @@ bool DescribeDoubtful(const RelocalisedMap& map, MapCorrectionSources& sources) 
   return true;
 }
 
-// Has the doubtful frames compared with what looks like those that have moved next to them; whether
-// there is anything to compare.
-bool CompareDoubtful(const RelocalisedMap& map, MapCorrectionSources& sources) {
-  std::map<FrameId, std::set<FrameId>> matches;  // that stand, of frames that have moved
+// Adds pairs of the frames to check and the frames similar to the moved ones. Returns whether there
+// are any.
+bool CompareFramesToCheck(const RelocalisedMap& map, MapCorrectionSources& sources) {
+  std::map<FrameId, std::set<FrameId>> matches;  // frames that stay, by moved frame
   for (const auto& [frame, match] : sources.lookalikes) {
     if (map.moved.contains(frame) && !map.moved.contains(match)) matches[frame].insert(match);
     if (map.moved.contains(match) && !map.moved.contains(frame)) matches[match].insert(frame);
@@ -62,13 +62,12 @@ bool CompareDoubtful(const RelocalisedMap& map, MapCorrectionSources& sources) {
   return !pairs.empty();
 }
 
-// For each frame that tracks see, or that is apart, but that no map holds, if it is a place, one
-// that holds nothing else.
-std::vector<Reconstruction> MapsOfLost(const std::vector<Track>& tracks,
-                                       const std::set<FrameId>& apart,
-                                       const std::map<FrameId, Features>& places,
-                                       const RefinedComponents& refined) {
-  std::set<FrameId> lost = apart;
+// A map of its own for each place that tracks see, or that is unregistered, and that no map holds.
+std::vector<Reconstruction> MapsOfUnregistered(const std::vector<Track>& tracks,
+                                               const std::set<FrameId>& unregistered,
+                                               const std::map<FrameId, Features>& places,
+                                               const RefinedComponents& refined) {
+  std::set<FrameId> lost = unregistered;
   for (const Track& track : tracks) {
     for (const Observation& observation : track.observations) lost.insert(observation.frame);
   }
@@ -85,8 +84,8 @@ std::vector<Reconstruction> MapsOfLost(const std::vector<Track>& tracks,
   return maps;
 }
 
-// The pairs, and what else may find frames of one map in another one: those the other way round,
-// and the places before and behind them.
+// The given pairs and those that may connect two maps in addition: the reversed ones, and each
+// place with the places before and after it.
 std::vector<Lookalike> PairsAcross(const std::vector<const Reconstruction*>& maps,
                                    const std::map<FrameId, Features>& places,
                                    std::vector<Lookalike> pairs) {
@@ -94,7 +93,7 @@ std::vector<Lookalike> PairsAcross(const std::vector<const Reconstruction*>& map
   for (const Reconstruction* map : maps) {
     for (const auto& [frame, center] : map->center_in_world) map_of[frame] = map;
   }
-  // Whether there are points in which the frame may be found.
+  // Whether the two frames are in different maps, and the match's map has points.
   const auto is_across = [&](FrameId frame, FrameId match) {
     const auto from = map_of.find(frame);
     const auto to = map_of.find(match);
@@ -123,12 +122,13 @@ std::set<FrameId> CorrectMaps(MapCorrectionSources sources,
                               std::uint64_t seed,
                               const BundleOptions& bundle_options,
                               RefinedComponents& refined) {
-  // Where some stand right, others are seen to stand wrong.
+  // Further frames are found displaced once others have been corrected. The number of passes bounds
+  // the time.
   constexpr int kMaxPasses = 3;
   PlaceMatches places(sources.places, refined.camera);
   const auto relocalise = [&]() {
     const std::vector<Reconstruction> lost =
-        MapsOfLost(tracks, sources.apart, sources.places, refined);
+        MapsOfUnregistered(tracks, sources.unregistered, sources.places, refined);
     std::vector<const Reconstruction*> maps;
     for (const BundleResult& bundle : refined.bundles) maps.push_back(&bundle.reconstruction);
     for (const Reconstruction& map : lost) maps.push_back(&map);
@@ -146,12 +146,12 @@ std::set<FrameId> CorrectMaps(MapCorrectionSources sources,
     std::vector<RelocalisedMap> changed = relocalise();
     bool has_more = false;
     for (const RelocalisedMap& map : changed) {
-      has_more |= DescribeDoubtful(map, sources);
-      has_more |= CompareDoubtful(map, sources);
+      has_more |= DescribeFramesToCheck(map, sources);
+      has_more |= CompareFramesToCheck(map, sources);
     }
     if (has_more) changed = relocalise();
     const std::set<FrameId> now = RefineRelocalised(
-        changed, sources.held, calibrated, bundle_options, sources.complete, tracks, refined);
+        changed, sources.segments, calibrated, bundle_options, sources.complete, tracks, refined);
     if (now.empty()) break;
     moved.insert(now.begin(), now.end());
   }

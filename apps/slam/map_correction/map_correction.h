@@ -14,32 +14,30 @@
 
 namespace rotslam {
 
-/// Described corners of some frames of a map, where a global shutter would see them; fewer where
-/// images cannot be had.
+/// Detects and describes corners of frames of a map, at their positions in a global-shutter image.
+/// Frames whose images cannot be read are missing in the result.
 using FrameDescription = std::function<std::map<FrameId, Features>(
     const Reconstruction& map, const std::set<FrameId>& frames)>;
 
-/// What says that frames stand in a wrong place.
+/// Evidence that frames are in a wrong place, and what the correction needs beside the maps.
 struct MapCorrectionSources {
   std::vector<Lookalike> lookalikes;
-  std::map<FrameId, Features> places;     // described corners of those and of some around them
-  std::set<FrameId> apart;                // frames whose tracks do not place them in a map
-  FrameDescription describe;              // for frames that are no places; may be null
-  TrackCompletion complete;               // as RefineBundle takes it
-  std::vector<PureRotationSegment> held;  // as RefineComponents takes them
+  std::map<FrameId, Features> places;  // described corners of those frames and some around them
+  std::set<FrameId> unregistered;      // frames whose tracks do not place them in a map
+  FrameDescription describe;           // for frames not in `places`; may be null
+  TrackCompletion complete;            // as RefineBundle takes it
+  std::vector<PureRotationSegment> segments;  // as RefineComponents takes them
 };
 
-/// Moves keyframes to where others that look alike say that they are (see Relocalise), and adjusts
-/// the maps from there, as long as that makes them explain more. Keyframes next to those that move
-/// are looked at, too: what led the ones astray may mislead the others. Places that no map holds,
-/// and maps apart from the others, are found in the same way, by what looks alike and by what comes
-/// before and behind them.
+/// Moves keyframes that Relocalise finds in a wrong place, and adjusts the maps from there, as long
+/// as the maps explain more observations that way. Neighbours of a moved keyframe are tested as
+/// well, since the same wrong matches may have misled them. Places that no map holds, and maps that
+/// are not connected to the others, are found in the same way.
 /// @param calibrated  the camera as it was given.
 /// @param tracks      as RefineComponents took them.
 /// @param refined     the maps; those that are corrected are replaced.
-/// @return  the keyframes that stand elsewhere now; the same at any number of threads.
-/// Error:   from three starts EuRoC's keyframes end in the same places to 2 mm with seven seeds of
-/// eight, see docs/method.md.
+/// @return  the keyframes that were moved; the same at any number of threads.
+/// Error:   see docs/measurements.md.
 /// Cost:    Relocalise's, and a bundle adjustment for each of up to three passes.
 std::set<FrameId> CorrectMaps(MapCorrectionSources sources,
                               const Camera& calibrated,

@@ -3,7 +3,8 @@
 namespace rotslam {
 
 std::vector<Match> PlaceMatches::Between(FrameId i, FrameId j, const Rotation& predicted_j_from_i) {
-  // A few pixels, of a search circle of forty.
+  // Largest change of the prediction at which matches are reused: a few pixels, while the search
+  // radius is forty.
   constexpr double kSameDeg = 0.5;
   {
     const std::scoped_lock lock(mutex_);

@@ -11,7 +11,7 @@
 
 namespace rotslam {
 
-/// Matches between places, kept for whoever asks again.
+/// Matches between places, computed once and kept.
 class PlaceMatches {
  public:
   /// @param places  described corners of frames, where a global shutter would see them; more may
@@ -21,8 +21,8 @@ class PlaceMatches {
 
   const std::map<FrameId, Features>& places() const { return places_; }
 
-  /// As MatchFeatures of the two places. A pair is matched again only where the prediction has
-  /// turned by more than half a degree since. Several threads may ask.
+  /// MatchFeatures of the two places. A pair is matched again only where the prediction has changed
+  /// by more than half a degree. May be called from several threads.
   std::vector<Match> Between(FrameId i, FrameId j, const Rotation& predicted_j_from_i);
 
  private:

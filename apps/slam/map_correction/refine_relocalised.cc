@@ -8,7 +8,7 @@
 namespace rotslam {
 namespace {
 
-// The tracks with observations more, those of frames that they have already left out.
+// Adds observations to the tracks, where their frame has none yet.
 std::vector<Track> WithSightings(const std::vector<std::pair<TrackId, Observation>>& sightings,
                                  std::vector<Track> tracks) {
   std::map<TrackId, std::map<FrameId, Observation>> added;
@@ -27,7 +27,7 @@ std::vector<Track> WithSightings(const std::vector<std::pair<TrackId, Observatio
   return tracks;
 }
 
-// Of those in `parts`, the one with the most observations.
+// The component of `parts` with the most observations.
 int LargestOf(const std::set<int>& parts, const RefinedComponents& refined) {
   return *std::max_element(parts.begin(), parts.end(), [&](int a, int b) {
     return refined.bundles[a].summary.num_observations <
@@ -39,13 +39,13 @@ int NumExplained(const BundleSummary& summary) {
   return summary.num_observations + summary.support.num_observations;
 }
 
-// Whether none of the map's frames that had a place has another one now, and those that had none
-// are seen well there.
+// Whether the only change are new frames, and each of them has enough observations.
 bool AddsFramesOnly(const RelocalisedMap& map,
                     const BundleResult& bundle,
                     const std::set<int>& parts,
                     const RefinedComponents& refined) {
-  // What relocalisation takes for no chance.
+  // The same as the default of RelocalisationOptions::min_inliers: more than wrong places explain
+  // by chance.
   constexpr int kLeastObservations = 30;
   std::map<FrameId, int> num_observations;
   for (const Track& track : bundle.reconstruction.tracks) {
@@ -59,10 +59,10 @@ bool AddsFramesOnly(const RelocalisedMap& map,
          });
 }
 
-// Whether the map that takes the parts' place is better: where frames have moved it explains more,
-// of all that is seen now, and of what the tracker saw, so that what is found new counts once and
-// what is lost twice. Where frames are but added the rest need only be as before; every adjustment
-// takes and leaves some hundreds of other observations.
+// Whether the new map is better than the components it replaces. Where frames have moved it must
+// explain more observations; those of the tracker count twice, those found later once. Where frames
+// were only added the number may fall by two percent, since every bundle adjustment classifies some
+// hundreds of observations differently.
 bool IsBetter(const RelocalisedMap& map,
               const BundleResult& bundle,
               const std::set<int>& parts,
@@ -76,7 +76,7 @@ bool IsBetter(const RelocalisedMap& map,
          AddsFramesOnly(map, bundle, parts, refined);
 }
 
-// What an adjustment took that led to the other one, or to nothing.
+// Adds the rounds, iterations and time of an adjustment to another summary.
 void AddEffort(const BundleSummary& other, BundleSummary& summary) {
   summary.iterations += other.iterations;
   summary.seconds += other.seconds;
@@ -86,7 +86,7 @@ void AddEffort(const BundleSummary& other, BundleSummary& summary) {
 }  // namespace
 
 std::set<FrameId> RefineRelocalised(const std::vector<RelocalisedMap>& maps,
-                                    const std::vector<PureRotationSegment>& held,
+                                    const std::vector<PureRotationSegment>& segments,
                                     const Camera& calibrated,
                                     BundleOptions options,
                                     const TrackCompletion& complete,
@@ -101,7 +101,8 @@ std::set<FrameId> RefineRelocalised(const std::vector<RelocalisedMap>& maps,
     if (parts.empty()) continue;
     MapComponent component;
     for (const auto& [frame, center] : map.center_in_world) component.keyframes.insert(frame);
-    // Where frames stood in a wrong place the lens made up for it. Several maps have one lens.
+    // Wrong places bias the lens, so it starts from the calibration. With several maps it is kept
+    // fixed, since all have the same lens.
     const bool is_all = parts.size() == refined.components.size();
     const Camera& camera = is_all ? calibrated : refined.camera;
     std::vector<Track> seen = WithBearingsOf(camera, WithSightings(map.sightings, tracks));
@@ -109,9 +110,9 @@ std::set<FrameId> RefineRelocalised(const std::vector<RelocalisedMap>& maps,
                                           map.cam_from_world,
                                           map.center_in_world,
                                           seen,
-                                          held,
+                                          segments,
                                           camera,
-                                          is_all ? options : WithLensHeld(options),
+                                          is_all ? options : WithFixedLens(options),
                                           complete);
     BundleSummary& before = refined.bundles[LargestOf(parts, refined)].summary;
     if (!IsBetter(map, bundle, parts, refined)) {
@@ -128,7 +129,7 @@ std::set<FrameId> RefineRelocalised(const std::vector<RelocalisedMap>& maps,
       bundle.summary.lens_refined = before.lens_refined;
       bundle.summary.lens_sigmas = before.lens_sigmas;
     }
-    // Components go by their first keyframe.
+    // Components are ordered by their first keyframe.
     const int first = *parts.begin();
     refined.bundles[first] = std::move(bundle);
     refined.components[first] = std::move(component);

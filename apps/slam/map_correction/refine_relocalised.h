@@ -8,17 +8,17 @@
 
 namespace rotslam {
 
-/// Bundle adjustment once more of the maps that Relocalise has changed; of one that is all there is
-/// with the lens, and else with the lens as it is. Those that explain more of the images then
-/// replace the components that they were made of. Their rounds, iterations and seconds count those
-/// of these components, too, and where a map is refused the component counts the map's.
-/// @param maps        parts beyond the components are those of frames that had no place.
+/// Adjusts the maps that Relocalise has changed. A map of all keyframes refines the lens, the
+/// others keep it fixed. A map that explains more observations than the components it was made of
+/// replaces them. Rounds, iterations and seconds of the summaries include those of the replaced
+/// components, or of the rejected map.
+/// @param maps  indices of parts beyond the components denote frames that had no place.
 /// @param calibrated  the camera as it was given.
-/// @param tracks      as Relocalise took them; get the sightings of the maps that are kept.
+/// @param tracks  the input of Relocalise; receive the sightings of the accepted maps.
 /// @param refined     what Relocalise was given.
-/// @return  the keyframes that stand elsewhere now.
+/// @return  the keyframes that were moved.
 std::set<FrameId> RefineRelocalised(const std::vector<RelocalisedMap>& maps,
-                                    const std::vector<PureRotationSegment>& held,
+                                    const std::vector<PureRotationSegment>& segments,
                                     const Camera& calibrated,
                                     BundleOptions options,
                                     const TrackCompletion& complete,

@@ -13,7 +13,7 @@
 namespace rotslam {
 namespace {
 
-// What `find` finds for 0 to `count` - 1.
+// Results of `find` for 0 to `count` - 1, without the empty ones.
 std::vector<FoundFrame> FindEach(int count,
                                  int num_threads,
                                  const std::function<std::optional<FoundFrame>(int)>& find) {
@@ -26,7 +26,7 @@ std::vector<FoundFrame> FindEach(int count,
   return all;
 }
 
-// What is found of the pairs.
+// Finds the pose of each pair's frame.
 std::vector<FoundFrame> FindPairs(const FrameFinder& finder,
                                   const std::vector<Lookalike>& pairs,
                                   int num_threads) {
@@ -35,7 +35,8 @@ std::vector<FoundFrame> FindPairs(const FrameFinder& finder,
   });
 }
 
-// The same; where a frame turns out to be displaced, neighbours are asked on both sides, too.
+// The same; the neighbours of both frames of a pair are tested as well where its frame is
+// displaced.
 std::vector<FoundFrame> FindAll(const FrameFinder& finder,
                                 const std::vector<Lookalike>& lookalikes,
                                 int num_threads) {
@@ -56,7 +57,7 @@ std::vector<FoundFrame> FindAll(const FrameFinder& finder,
   return all;
 }
 
-// What is found of the frames against what their own tracks show.
+// Finds the pose of each frame from the points of its own tracks.
 std::vector<FoundFrame> FindAllByTracks(const FrameFinder& finder,
                                         const std::vector<Track>& tracks,
                                         int num_threads) {
@@ -69,10 +70,10 @@ std::vector<FoundFrame> FindAllByTracks(const FrameFinder& finder,
   });
 }
 
-// The frames of one map that move: of two that contradict each other one does.
+// The frames of one map that are moved: one of each two that contradict each other.
 class Displaced {
  public:
-  // @param found  of frames of the map, against points of it.
+  // @param found  poses of frames of the map from points of the same map.
   Displaced(const FrameFinder& finder,
             const Reconstruction& map,
             const std::vector<const FoundFrame*>& found)
@@ -82,12 +83,13 @@ class Displaced {
       if (one->is_displaced) Take(*one);
     }
     std::erase_if(frames_, [&](FrameId frame) { return !move_.contains(frame); });
-    if (!frames_.empty()) Grow(map);
+    if (!frames_.empty()) AddConnectedFrames(map);
   }
 
   const std::set<FrameId>& frames() const { return frames_; }
 
-  // Its own, or that of the frame which shares most points with it; null where there is none.
+  // The similarity found for the frame, or for the moved frame with the most common points; null
+  // where there is none.
   const Similarity* MoveOf(FrameId frame) const {
     const auto own = move_.find(frame);
     if (own != move_.end()) return &own->second.move;
@@ -102,7 +104,7 @@ class Displaced {
     return nearest;
   }
 
-  // Whether it says how one that moves stands to one that does not.
+  // Whether the found pose relates a frame that moves to one that stays.
   bool IsTaken(const FoundFrame& found) const {
     if (!found.is_displaced) return false;
     const bool frame_moves = frames_.contains(found.frame);
@@ -116,7 +118,8 @@ class Displaced {
     Similarity move;
   };
 
-  // Those that are contradicted by the largest part of what is known of them.
+  // Selects the frames to move: in turn the one for which contradictions are the largest share of
+  // the evidence.
   void Choose(const Reconstruction& map, const std::vector<const FoundFrame*>& found) {
     std::map<FrameId, double> agreeing;
     for (const FoundFrame* one : found) {
@@ -170,8 +173,8 @@ class Displaced {
     best = {found.num_inliers, frame_moves ? found.move : found.move.Inverse()};
   }
 
-  // Adds frames that share more points with those that move than with the rest.
-  void Grow(const Reconstruction& map) {
+  // Adds frames that share more points with the moved frames than with the rest.
+  void AddConnectedFrames(const Reconstruction& map) {
     struct Seers {
       int moving = 0;
       int staying = 0;
@@ -183,8 +186,8 @@ class Displaced {
         ++(moves ? seers[track].moving : seers[track].staying);
       }
     }
-    for (bool has_grown = true; has_grown;) {
-      has_grown = false;
+    for (bool has_added = true; has_added;) {
+      has_added = false;
       for (const auto& [frame, center] : map.center_in_world) {
         if (frames_.contains(frame) || anchored_.contains(frame)) continue;
         int with_moving = 0;
@@ -199,24 +202,24 @@ class Displaced {
           ++seers[track].moving;
           --seers[track].staying;
         }
-        has_grown = true;
+        has_added = true;
       }
     }
   }
 
   const FrameFinder& finder_;
   std::set<FrameId> frames_;
-  std::set<FrameId> anchored_;  // a found pose says that they are near their place
+  std::set<FrameId> anchored_;  // frames that a found pose confirms near their place
   std::map<FrameId, Best> move_;
 };
 
-// Maps that see the same become one, in the world of the largest.
-class Joined {
+// Maps merged where they see the same points, in the world of the largest.
+class MergedMaps {
  public:
-  // @param links  of frames of one map, against points of another.
-  Joined(const FrameFinder& finder,
-         const std::vector<const Reconstruction*>& maps,
-         std::vector<const FoundFrame*> links)
+  // @param links  poses of frames of one map from points of another.
+  MergedMaps(const FrameFinder& finder,
+             const std::vector<const Reconstruction*>& maps,
+             std::vector<const FoundFrame*> links)
       : maps_(maps), parts_(maps.size()), move_(maps.size()) {
     for (int k = 0; k < std::ssize(maps); ++k) parts_[k] = {k};
     std::stable_sort(links.begin(), links.end(), [](const FoundFrame* a, const FoundFrame* b) {
@@ -230,7 +233,7 @@ class Joined {
   }
 
   const std::set<int>& PartsWith(int map) const { return parts_[map]; }
-  // Into the world of the largest of its parts.
+  // Similarity into the world of the largest map it is merged with.
   const Similarity& MoveOf(int map) const { return move_[map]; }
 
   int LargestOf(const std::set<int>& parts) const {
@@ -240,7 +243,7 @@ class Joined {
   }
 
  private:
-  // @param move  from the one's world to the other's.
+  // @param move  from the world of `from` to that of `to`.
   void Join(int from, int to, const Similarity& move) {
     const Similarity into_other = move_[to] * move * move_[from].Inverse();
     std::set<int> both = parts_[from];
@@ -289,7 +292,7 @@ std::vector<RelocalisedMap> Relocalise(const std::vector<const Reconstruction*>&
       inside[map].push_back(&found);
     }
   }
-  const Joined joined(finder, maps, links);
+  const MergedMaps joined(finder, maps, links);
 
   std::vector<RelocalisedMap> changed;
   for (int k = 0; k < std::ssize(maps); ++k) {

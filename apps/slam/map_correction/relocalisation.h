@@ -13,33 +13,35 @@
 
 namespace rotslam {
 
-/// A map with other poses, or one in the place of several.
+/// A map with corrected poses. It may replace several maps.
 struct RelocalisedMap {
-  std::set<int> parts;  // the maps that it takes the place of
+  std::set<int> parts;  // indices of the maps that it replaces
   // Of all their frames.
   RotationMap cam_from_world;
   CenterMap center_in_world;
   // Observations of known points that it rests on.
   std::vector<std::pair<TrackId, Observation>> sightings;
-  std::set<FrameId> moved;  // those that stand elsewhere than in the largest of the parts
+  std::set<FrameId> moved;  // frames whose place differs from that in the largest of the parts
 };
 
-/// Finds frames that stand in a wrong place. Of two frames that look alike, one is placed anew
-/// against the points that the other one and its neighbours see, by their descriptors, whatever
-/// the present poses are; and every frame against the points that its own tracks show. Where what
-/// is found contradicts a present pose, one of the two frames moves: the one of which most of what
-/// is known speaks against it. With it move the frames that share more points with those that move
-/// than with the rest. Maps that see the same become one. What comes out are starts: bundle
-/// adjustment has to say whether they are better.
+/// Finds frames that are in a wrong place of the map.
+///
+/// For each pair of similar frames, the pose of one is estimated anew from the points that the
+/// other one and its neighbours see, by matching descriptors and independent of the present poses.
+/// Every frame is tested against the points of its own tracks as well. Where a found pose
+/// contradicts the present one, the frame of the pair against which more evidence speaks is moved.
+/// Frames that share more points with the moved ones than with the rest move with them. Maps that
+/// see the same points are merged. The results are start values; bundle adjustment decides whether
+/// they are better.
 /// @param maps    each in its own world; no frame in two of them.
 /// @param tracks  with the ids of the maps' points, and all observations, whether they fit or not.
-/// @param places  to be given again where Relocalise is asked again.
+/// @param places  pass the same object to later calls, which use its matches again.
 /// @return  the maps that change; the same at any `num_threads`. Throws std::invalid_argument when
 /// an option is out of range.
 /// Error:   to a few hundredths of the distance to the points (relocalisation tests).
-/// Cost:    20 ms for each pair that looks alike, 100 ms for one that has to ask neighbours.
-/// Source:  as Mur-Artal and Tardos, ORB-SLAM2, 2017, sec. III-E, relocalise a lost camera; whom to
-/// believe is ours.
+/// Cost:    20 ms for each pair, 100 ms where neighbours are needed.
+/// Source:  Mur-Artal and Tardos, ORB-SLAM2, 2017, sec. III-E, for the relocalisation of a single
+///          frame. The choice of the frame that moves is ours.
 std::vector<RelocalisedMap> Relocalise(const std::vector<const Reconstruction*>& maps,
                                        const std::vector<Track>& tracks,
                                        PlaceMatches& places,

@@ -114,7 +114,7 @@ TEST_F(BadInput, AVideoThatWasCutOff) {
   const std::string part = folder_.Write("part.avi", bytes.substr(0, bytes.size() / 2)).string();
   EXPECT_THAT(rotations(part).error,
               ContainsRegex("^rotslam: warning: the video ends after 1[0-9] of the 24 frames it "
-                            "announces; is the file complete\\?\n$"));
+                            "announces: the file is cut off or damaged\\. [^\n]+\n$"));
 }
 
 TEST_F(BadInput, ListsWithFaults) {

@@ -198,8 +198,9 @@ TEST_F(ReportPage, TellsOfAReadoutThatTheImagesTell) {
   const Json seen = Visit("rotations", folder_.path() / "rotations", sequence);
   ASSERT_FALSE(seen.contains("failure")) << seen.at("failure");
   EXPECT_THAT(seen.at("notes").dump(),
-              testing::ContainsRegex("The shutter rolls: the images tell a readout of 2[0-9.]+ .+ "
-                                     "[0-9.]+ ms from the top"));
+              testing::ContainsRegex(
+                  "Rolling shutter: the readout time estimated from the images is 2[0-9.]+ .+ "
+                  "[0-9.]+ ms from the top"));
 }
 
 }  // namespace

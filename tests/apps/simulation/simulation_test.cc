@@ -367,11 +367,11 @@ TEST(GimbalPath, TurnsInPlaceToANewView) {
     const Simulation simulation(options);
     const Trajectory& truth = simulation.Truth();
     ASSERT_EQ(truth.size(), 120u);
-    ASSERT_EQ(simulation.Stretches().size(), 3u);
-    const Stretch turn = simulation.Stretches()[1];
+    ASSERT_EQ(simulation.Segments().size(), 3u);
+    const PathSegment turn = simulation.Segments()[1];
     EXPECT_EQ(turn.kind, MotionKind::kRotating);
-    EXPECT_EQ(simulation.Stretches()[0].last_frame + 1, turn.first_frame);
-    EXPECT_EQ(simulation.Stretches()[2].first_frame, turn.last_frame + 1);
+    EXPECT_EQ(simulation.Segments()[0].last_frame + 1, turn.first_frame);
+    EXPECT_EQ(simulation.Segments()[2].first_frame, turn.last_frame + 1);
     double farthest = 0.0;
     for (int k = turn.first_frame; k <= turn.last_frame; ++k) {
       farthest = std::max(

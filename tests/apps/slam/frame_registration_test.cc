@@ -82,11 +82,11 @@ TEST(RegisterFrames, KeepsNearTheOrientationsOfTheOdometry) {
   EXPECT_GT(unknown.AngleErrorDeg(), 3.0 * odometry_deg) << "the points alone are no better";
 }
 
-TEST(RegisterFrames, TakesThePlaceOfAStretchAndInterpolatesWithoutPoints) {
+TEST(RegisterFrames, TakesThePlaceOfASegmentAndInterpolatesWithoutPoints) {
   Street whole(1000);
   whole.Place();
   Street street(1000);
-  street.result.held.push_back({FrameId{5}, FrameId{8}, 1.0});
+  street.result.segments.push_back({FrameId{5}, FrameId{8}, 1.0});
   for (Track& track : street.scene.tracks) {
     std::erase_if(track.observations,
                   [](const Observation& sighting) { return sighting.frame == FrameId{12}; });

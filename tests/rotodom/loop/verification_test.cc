@@ -87,7 +87,7 @@ struct Case {
   RotationMap cam_from_world;
   RotationRates rates;
   int num_consistent = 1;
-  bool is_way_known = true;
+  bool are_linked = true;
   VerificationOptions options;
   VerificationTools tools;
 
@@ -100,7 +100,7 @@ struct Case {
                       cam_from_world,
                       rates,
                       num_consistent,
-                      is_way_known,
+                      are_linked,
                       scene.camera,
                       options,
                       tools);
@@ -313,7 +313,7 @@ TEST(VerifyLoop, DriftIsBoundedWhereTheWayIsKnown) {
   ExpectRefused(known);
   EXPECT_NEAR(known.angle_deg, 4.0, 0.3);
   EXPECT_GT(known.num_inliers, 350);
-  c.is_way_known = false;
+  c.are_linked = false;
   EXPECT_TRUE(c.Verify().accepted);
 }
 
@@ -356,13 +356,13 @@ TEST(VerifyLoop, AllTurnsMayBeTooSmall) {
   const LoopEvidence round = c.Verify();
   EXPECT_TRUE(round.accepted);
   EXPECT_GT(round.angle_deg, 20.0);
-  EXPECT_NEAR(round.way.turn_scale, 1.0 / 0.93, 0.003);
-  EXPECT_LT(round.way.angle_deg, 1.0);
+  EXPECT_NEAR(round.scaled.turn_scale, 1.0 / 0.93, 0.003);
+  EXPECT_LT(round.scaled.angle_deg, 1.0);
   c.options.max_turn_error = 0.02;
   ExpectRefused(c.Verify());
 }
 
-TEST(ScaleTurns, FindsTheScaleThatClosesTheWay) {
+TEST(ScaleRotations, FindsTheScaleThatClosesTheWay) {
   const Rotation from = Rotation::Exp({0.1, 0.2, 0.3});
   const Rotation to = Rotation::Exp({0.05, 0.4, 0.0});
   RelativeRotation loop;
@@ -372,13 +372,13 @@ TEST(ScaleTurns, FindsTheScaleThatClosesTheWay) {
   for (const double scale : {0.92, 1.0, 1.05}) {
     RotationMap cam_from_world;
     GoRound(from, to, scale, loop.i, loop.j, cam_from_world);
-    const WayAround way = ScaleTurns(cam_from_world, loop, 0.1);
-    EXPECT_NEAR(way.turn_scale, 1.0 / scale, 1e-6);
-    EXPECT_LT(way.angle_deg, 1e-4);
+    const ScaledLoop scaled = ScaleRotations(cam_from_world, loop, 0.1);
+    EXPECT_NEAR(scaled.turn_scale, 1.0 / scale, 1e-6);
+    EXPECT_LT(scaled.angle_deg, 1e-4);
   }
 }
 
-TEST(ScaleTurns, StaysWithinItsBound) {
+TEST(ScaleRotations, StaysWithinItsBound) {
   const Rotation from;
   const Rotation to = Rotation::Exp({0.0, 0.3, 0.0});
   RelativeRotation loop;
@@ -387,12 +387,12 @@ TEST(ScaleTurns, StaysWithinItsBound) {
   loop.j_from_i = to;
   RotationMap cam_from_world;
   GoRound(from, to, 0.8, loop.i, loop.j, cam_from_world);
-  const WayAround way = ScaleTurns(cam_from_world, loop, 0.1);
-  EXPECT_NEAR(way.turn_scale, 1.1, 1e-9);
-  EXPECT_GT(way.angle_deg, 30.0);
+  const ScaledLoop scaled = ScaleRotations(cam_from_world, loop, 0.1);
+  EXPECT_NEAR(scaled.turn_scale, 1.1, 1e-9);
+  EXPECT_GT(scaled.angle_deg, 30.0);
 }
 
-TEST(ScaleTurns, SaysNothingOfAStraightWay) {
+TEST(ScaleRotations, SaysNothingOfAStraightWay) {
   RelativeRotation loop;
   loop.i = FrameId{0};
   loop.j = FrameId{2};
@@ -400,9 +400,9 @@ TEST(ScaleTurns, SaysNothingOfAStraightWay) {
   const RotationMap cam_from_world = {{FrameId{0}, Rotation()},
                                       {FrameId{1}, Rotation::Exp({0.0, 0.02, 0.0})},
                                       {FrameId{2}, Rotation::Exp({0.0, 0.03, 0.0})}};
-  const WayAround way = ScaleTurns(cam_from_world, loop, 0.1);
-  EXPECT_EQ(way.turn_scale, 1.0);
-  EXPECT_NEAR(way.angle_deg, 0.02 * kDegFromRad, 1e-9);
+  const ScaledLoop scaled = ScaleRotations(cam_from_world, loop, 0.1);
+  EXPECT_EQ(scaled.turn_scale, 1.0);
+  EXPECT_NEAR(scaled.angle_deg, 0.02 * kDegFromRad, 1e-9);
 }
 
 TEST(VerifyLoop, ARollingShutterMakesEdgesLessCertain) {

@@ -55,10 +55,10 @@ TEST(ExposureMeter, FollowsACameraThatAdapts) {
 TEST(ExposureMeter, AsksPairsThatTurnDifferently) {
   const Eigen::Vector3d slow(0.0, 0.2, 0.0);
   const Eigen::Vector3d fast(0.5, 1.0, 0.0);
-  EXPECT_TRUE(ExposureMeter::Tells(slow, fast, 250.0));
-  EXPECT_TRUE(ExposureMeter::Tells(fast, slow, 250.0));
-  EXPECT_FALSE(ExposureMeter::Tells(fast, 0.7 * fast, 250.0));
-  EXPECT_FALSE(ExposureMeter::Tells(0.1 * slow, slow, 250.0));  // 45 px/s are no blur
+  EXPECT_TRUE(ExposureMeter::IsInformative(slow, fast, 250.0));
+  EXPECT_TRUE(ExposureMeter::IsInformative(fast, slow, 250.0));
+  EXPECT_FALSE(ExposureMeter::IsInformative(fast, 0.7 * fast, 250.0));
+  EXPECT_FALSE(ExposureMeter::IsInformative(0.1 * slow, slow, 250.0));  // 45 px/s are no blur
 }
 
 TEST(ExposureMeter, NeedsPoints) {

@@ -10,8 +10,8 @@ namespace rotslam {
 /// The method of the paper that rotslam started from, to compare with; the program itself minimises
 /// Sampson distances over rotation and direction.
 ///
-/// Sums over bearing pairs that hold all the normal epipolar constraint needs to know about them,
-/// so that the cost of a solver iteration does not depend on their number.
+/// Sums over bearing pairs that suffice for the normal epipolar constraint, so that the cost of a
+/// solver iteration does not depend on their number.
 ///
 /// With E = [t]x R the algebraic residual of a pair is r = f_j^T E f_i, linear in the nine entries
 /// of E, so sum w r^2 = e^T S e with S = sum w q q^T, q = vec(f_j f_i^T).

@@ -82,11 +82,11 @@ TEST(AngularMotion, ToMidFrameUndoesAfter) {
   }
 }
 
-TEST(BelievedMotionAt, TellsHowFarItIsOff) {
+TEST(EstimateMotionAt, TellsHowFarItIsOff) {
   const auto time_s = [](FrameId at) { return at.value / 30.0; };
   const RotationMap cam_from_world = SwayingFrames(9, 1.0 / 30.0);
   for (const int frame : {0, 4, 8}) {
-    const BelievedMotion believed = BelievedMotionAt(FrameId{frame}, cam_from_world, time_s, 0.024);
+    const MotionEstimate believed = EstimateMotionAt(FrameId{frame}, cam_from_world, time_s, 0.024);
     const double error_rad = LargestErrorRad(FrameId{frame}, 2);
     EXPECT_GT(believed.error_rad, 0.5 * error_rad) << frame;
     EXPECT_LT(believed.error_rad, 2.0 * error_rad) << frame;

@@ -137,7 +137,7 @@ struct Walk {
     map.cam_from_world[frame] = halfway;
     sum.convertTo(sum, CV_8U, 1.0 / kSamples);
     views[frame] = MakeMapView(sum);
-    views[frame].turn_while_exposed = turn;
+    views[frame].rotation_while_exposed = turn;
   }
 
   Eigen::Vector2d TruePx(FrameId frame, TrackId track) const {
@@ -272,7 +272,7 @@ TEST(CompleteTracks, FindsSharpPatchesInBlurredViews) {
   walk.See(3, 5);
   for (const int k : {1, 3, 5, 7}) walk.BlurBy(FrameId{k}, {0.01, 0.02 + 0.001 * k, 0.0});
   std::vector<double> alike_px = ErrorsPx(walk, walk.Complete());
-  for (auto& [frame, view] : walk.views) view.turn_while_exposed.setZero();
+  for (auto& [frame, view] : walk.views) view.rotation_while_exposed.setZero();
   std::vector<double> blurred_px = ErrorsPx(walk, walk.Complete());
   RecordProperty("alike_px", std::to_string(Quantile(alike_px, 0.9)));
   RecordProperty("blurred_px", std::to_string(Quantile(blurred_px, 0.9)));

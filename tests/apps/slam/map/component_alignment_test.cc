@@ -12,7 +12,7 @@ namespace {
 struct Boundary {
   Scene scene;
   std::vector<double> timestamps_s;
-  std::vector<PureRotationSegment> held;
+  std::vector<PureRotationSegment> segments;
   ResectionOptions resection;
   Reconstruction placed;
   Reconstruction part;
@@ -58,7 +58,7 @@ struct Boundary {
     return AlignComponent(
         placed,
         part,
-        {scene.true_cam_from_world, timestamps_s, held, tracks, scene.camera, resection});
+        {scene.true_cam_from_world, timestamps_s, segments, tracks, scene.camera, resection});
   }
 
   // How far the part's frame then is from where it was.
@@ -121,7 +121,7 @@ TEST(AlignComponent, APartBeforeAllElseGoesBefore) {
 TEST(AlignComponent, WithinAPureRotationSegmentItStandsWhereThatBegan) {
   Boundary boundary;
   boundary.Cut(19, 24);
-  boundary.held.push_back({FrameId{19}, FrameId{24}, 1.0, {}});
+  boundary.segments.push_back({FrameId{19}, FrameId{24}, 1.0, {}});
   const Similarity held = boundary.Place(boundary.scene.tracks);
   EXPECT_LT((held.Move(boundary.part.center_in_world.at(FrameId{24})) -
              boundary.placed.center_in_world.at(FrameId{19}))

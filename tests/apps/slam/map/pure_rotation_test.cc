@@ -186,9 +186,9 @@ bool IsOffAxis(const BaScene& scene, const Camera& camera) {
       observation.bearing = *camera.Unproject(observation.keypoint_px);
     }
   }
-  const PureRotationSegment stretch = {FrameId{0}, FrameId{23}};
+  const PureRotationSegment segment = {FrameId{0}, FrameId{23}};
   return WithoutOffAxisRotations(
-             {stretch}, {camera, GraphOf(scene), scene.truth.cam_from_world, tracks}, {}, {})
+             {segment}, {camera, GraphOf(scene), scene.truth.cam_from_world, tracks}, {}, {})
       .empty();
 }
 
@@ -219,10 +219,10 @@ TEST(WithoutOffAxisRotations, DoesNotAskACameraAtRest) {
 
 TEST(WithoutOffAxisRotations, NotWhereNothingIsSeen) {
   const BaScene scene = SceneOffAxis(0.2, 0.05);
-  const PureRotationSegment stretch = {FrameId{0}, FrameId{23}};
+  const PureRotationSegment segment = {FrameId{0}, FrameId{23}};
   const ViewGraph graph = GraphOf(scene);
   EXPECT_EQ(WithoutOffAxisRotations(
-                {stretch}, {scene.camera, graph, scene.truth.cam_from_world, {}}, {}, {})
+                {segment}, {scene.camera, graph, scene.truth.cam_from_world, {}}, {}, {})
                 .size(),
             1U);
 }

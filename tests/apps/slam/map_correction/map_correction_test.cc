@@ -139,7 +139,7 @@ TEST_F(CorrectMapsTest, FindsFramesApartByThoseBeforeThem) {
     std::erase_if(track.observations, [](const auto& one) { return one.frame == FrameId{11}; });
   }
   Adjust(PartOf(map_, false));
-  sources_.apart = {FrameId{11}};
+  sources_.unregistered = {FrameId{11}};
   EXPECT_THAT(Correct(), Contains(FrameId{11}));
   ASSERT_EQ(refined_.bundles.size(), 1U);
   const CenterMap& centers = refined_.bundles[0].reconstruction.center_in_world;

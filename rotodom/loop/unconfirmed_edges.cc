@@ -1,4 +1,4 @@
-#include "rotodom/loop/waiting_edges.h"
+#include "rotodom/loop/unconfirmed_edges.h"
 
 #include <algorithm>
 
@@ -9,25 +9,25 @@ bool IsSame(const RelativeRotation& a, const RelativeRotation& b) {
   return a.i == b.i && a.j == b.j;
 }
 
-// The world of the piece with edge.j, as edge.i's piece sees it.
+// Rotation between the worlds of the components of edge.i and edge.j.
 Rotation WorldFromWorld(const RelativeRotation& edge, const RotationMap& cam_from_world) {
   return cam_from_world.at(edge.i).Inverse() * edge.j_from_i.Inverse() * cam_from_world.at(edge.j);
 }
 
 }  // namespace
 
-void WaitingEdges::Remove(const std::vector<EdgeWithMatches>& connections) {
-  std::erase_if(waiting_, [&](const EdgeWithMatches& waiting) {
+void UnconfirmedEdges::Remove(const std::vector<EdgeWithMatches>& connections) {
+  std::erase_if(unconfirmed_, [&](const EdgeWithMatches& unconfirmed) {
     return std::any_of(
         connections.begin(), connections.end(), [&](const EdgeWithMatches& connection) {
-          return IsSame(waiting.edge, connection.edge);
+          return IsSame(unconfirmed.edge, connection.edge);
         });
   });
 }
 
-std::vector<EdgeWithMatches> WaitingEdges::Confirmed(const EdgeWithMatches& connection,
-                                                     const RotationMap& cam_from_world,
-                                                     const DisjointSets& pieces) const {
+std::vector<EdgeWithMatches> UnconfirmedEdges::Confirmed(const EdgeWithMatches& connection,
+                                                         const RotationMap& cam_from_world,
+                                                         const DisjointSets& pieces) const {
   const RelativeRotation& edge = connection.edge;
   const Rotation turn = WorldFromWorld(edge, cam_from_world);
   std::vector<EdgeWithMatches> agreeing = {connection};
@@ -39,7 +39,7 @@ std::vector<EdgeWithMatches> WaitingEdges::Confirmed(const EdgeWithMatches& conn
     });
   };
   int num_inliers = edge.num_inliers;
-  for (const EdgeWithMatches& other : waiting_) {
+  for (const EdgeWithMatches& other : unconfirmed_) {
     const bool links_the_same = pieces.Find(other.edge.i.value) == pieces.Find(edge.i.value) &&
                                 pieces.Find(other.edge.j.value) == pieces.Find(edge.j.value);
     if (!links_the_same) continue;
