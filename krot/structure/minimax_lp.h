@@ -55,6 +55,10 @@ MinimaxLpResult SolveL1Slack(const MinimaxProblem& problem,
                              const std::vector<double>& weights = {},
                              const LpOptions& options = {});
 
+/// Lower bounds exclude structures up to this many times their smallest depth, as large as a
+/// kilometre to a millimetre.
+inline constexpr double kMaxExtent = 1e6;
+
 /// True when `multipliers` prove, in plain double arithmetic with its rounding counted, that no
 /// structure has all residuals at most `gamma` and all depths positive. Independent of the LP
 /// engine: the multipliers are first repaired by weighted least squares onto

@@ -15,6 +15,9 @@
 namespace rotslam {
 namespace {
 
+// Gauss-Newton steps on all matches at the end, at most; it stops before where steps vanish.
+constexpr int kRefineIterations = 12;
+
 // Which rotation to believe is another question than whether there is a baseline: where both models
 // fit, as on the narrow strip that views after a long turn share, a small baseline would go into
 // the rotation.
@@ -100,14 +103,14 @@ std::optional<RelativeRotationEstimate> EstimateFrom(
     const RelativeRotationOptions& options,
     std::span<const KeypointCovariances> covariances) {
   const double threshold = options.inlier_px / focal_px;
-  const double smallest_noise = options.min_noise_px / focal_px;
+  const double smallest_noise = kMinNoisePx / focal_px;
   if (consensus.num_inliers < options.min_inliers) return std::nullopt;
   const PairArrays arrays(all, consensus.members);
 
-  const double loss = options.loss_sigmas *
-                      NoiseOf(SquaredDistances(arrays, consensus.model), threshold, smallest_noise);
+  const double loss =
+      kLossSigmas * NoiseOf(SquaredDistances(arrays, consensus.model), threshold, smallest_noise);
   const EpipolarFit epipolar =
-      RefineEpipolar(arrays, consensus.model, loss, options.refine_iterations, 1e-9);
+      RefineEpipolar(arrays, consensus.model, loss, kRefineIterations, 1e-9);
   RelativeRotationEstimate estimate;
   estimate.num_samples = consensus.num_samples;
   estimate.excess = consensus.excess;
@@ -127,7 +130,7 @@ std::optional<RelativeRotationEstimate> EstimateFrom(
   estimate.noise_px = noise * focal_px;
 
   const RotationFit rotation =
-      RefineRotation(arrays, epipolar.model.j_from_i, 2.0 * loss, options.refine_iterations);
+      RefineRotation(arrays, epipolar.model.j_from_i, 2.0 * loss, kRefineIterations);
   estimate.baseline = EvidenceOf(arrays,
                                  consensus.members,
                                  covariances,
@@ -174,21 +177,10 @@ std::optional<RelativeRotationEstimate> EstimateFrom(
 
 std::optional<std::string> RelativeRotationOptions::Problem() const {
   if (!(inlier_px > 0.0)) return OutOfRange("inlier_px", inlier_px, "positive");
-  if (!(loss_sigmas > 0.0)) return OutOfRange("loss_sigmas", loss_sigmas, "positive");
-  if (!(min_noise_px > 0.0)) return OutOfRange("min_noise_px", min_noise_px, "positive");
   if (!(shared_error_px >= 0.0)) {
     return OutOfRange("shared_error_px", shared_error_px, "zero or more");
   }
-  if (!(finest_px > 0.0)) return OutOfRange("finest_px", finest_px, "positive");
-  if (min_samples < 0) return OutOfRange("min_samples", min_samples, "zero or more");
-  if (sample_size < 5) return OutOfRange("sample_size", sample_size, "at least 5");
-  if (!(confidence > 0.0 && confidence < 1.0)) {
-    return "confidence = " + std::to_string(confidence) + ": must lie between 0 and 1";
-  }
   if (max_samples < 1) return OutOfRange("max_samples", max_samples, "at least 1");
-  if (refine_iterations < 1) {
-    return OutOfRange("refine_iterations", refine_iterations, "at least 1");
-  }
   if (min_inliers < 6) return OutOfRange("min_inliers", min_inliers, "at least 6");
   return ProblemIn("baseline", baseline);
 }

@@ -29,7 +29,7 @@ struct RecoveryOptions {
   MatchingOptions matching;
   RelativeRotationOptions relative_rotation;
   TrackingOptions tracking;
-  double min_inlier_ratio = 0.5;  // as in ViewGraphOptions, of what looks alike
+  double min_inlier_ratio = 0.5;  // of what looks alike
   std::uint64_t seed = 1;
   int num_threads = 1;
 };
