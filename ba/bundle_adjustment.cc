@@ -131,6 +131,8 @@ class Rounds {
   void Close(BundleRound round, Placement placement, BundleState& state) {
     // Few observations have changed: a step or two.
     constexpr double kEasier = 10.0;
+    // Classification has settled when it changes less than this share of the observations.
+    constexpr double kMaxChangedShare = 5e-4;
     if (!good_ || !round.enabled) return;
     last_ = round;
     for (int k = 0; k < options_.max_final_rounds && good_; ++k) {
@@ -141,7 +143,7 @@ class Rounds {
       std::size_t changed = 0;
       for (std::size_t o = 0; o < after.size(); ++o) changed += before[o] != after[o] ? 1 : 0;
       const auto total = static_cast<double>(std::count(after.begin(), after.end(), true));
-      if (k > 0 && static_cast<double>(changed) <= options_.max_changed_share * total) return;
+      if (k > 0 && static_cast<double>(changed) <= kMaxChangedShare * total) return;
       if (k == 2) round.function_tolerance *= kEasier;
       Minimise("close", round, start, state);
     }
@@ -220,7 +222,7 @@ class Rounds {
     if (!minimised) {
       result_.status = BundleStatus::kTooLittleData;
       result_.message = "round " + name + " had no moving frame with at least " +
-                        std::to_string(options_.min_frame_observations) +
+                        std::to_string(kMinFrameObservations) +
                         " observations of points that fit and have depth";
       return;
     }

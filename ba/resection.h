@@ -51,14 +51,10 @@ struct ResectionOptions {
   // The first field out of range, by name, value and limit; nullopt when all is well.
   std::optional<std::string> Problem() const;
 
+  // Not configuration: the members that are not visited; programs and tests set them.
   template <class Visitor>
   void Visit(Visitor&& visit) {
-    visit("refine_rotation", refine_rotation);
-    visit("refine_center", refine_center);
-    visit("loss_scale", loss_scale);
     visit("max_error_px", max_error_px);
-    visit("min_inliers", min_inliers);
-    visit("max_iterations", max_iterations);
   }
 };
 

@@ -8,6 +8,7 @@
 
 #include "krot/initialisation/global_positioning.h"
 #include "krot/initialisation/register_views.h"
+#include "krot/initialisation/robust_start.h"
 #include "krot/initialisation/robust_triangulation.h"
 #include "krot/initialisation/selection.h"
 #include "krot/named_problem.h"
@@ -33,7 +34,7 @@ std::optional<ComponentStart> SolveSelected(const RotationMap& cam_from_world,
   if (options.start == "positioning") {
     structure = SolveGlobalPositioning(named.problem, units.loose_rad);
   } else {
-    RobustStart robust = SolveRobustStart(named.problem, units.gamma, options.robust_start);
+    RobustStart robust = SolveRobustStart(named.problem, units.gamma);
     start.num_programs = robust.num_programs;
     if (robust.call == LpCallStatus::kCompleted) structure = std::move(robust.structure);
   }

@@ -30,11 +30,14 @@ KrotUnits WithThreshold(KrotUnits units, double gamma, const KrotOptions& option
   return units;
 }
 
+// Where orientations are less certain than threshold_px, the bound is this many standard deviations
+// of a track's keypoints and of its views' orientations together: 3 in 1,000 right ones exceed it.
+constexpr double kThresholdSigmas = 3.0;
+
 // Largest image error of a right observation, normalised, by track position: threshold_px, or more
 // where the orientations ask for it.
 std::vector<double> TrackThresholds(const std::vector<Track>& tracks,
                                     const std::map<FrameId, double>& sigma_rad,
-                                    const KrotOptions& options,
                                     const KrotUnits& units) {
   std::vector<double> thresholds;
   thresholds.reserve(tracks.size());
@@ -52,7 +55,7 @@ std::vector<double> TrackThresholds(const std::vector<Track>& tracks,
     const double turn = std::max(0.0, most - least);
     // Keypoints alone are in threshold_px already, whatever their sigma is called.
     const double grown =
-        turn > 0.0 ? options.threshold_sigmas * std::sqrt(keypoint * keypoint + turn) : 0.0;
+        turn > 0.0 ? kThresholdSigmas * std::sqrt(keypoint * keypoint + turn) : 0.0;
     thresholds.push_back(std::max(units.gamma, grown));
   }
   return thresholds;
@@ -299,14 +302,13 @@ void Solve(const RotationMap& cam_from_world,
            KrotUnits units,
            KrotSolution& solution) {
   std::vector<Track> tracks = CleanTracks(input, solution.removed);
-  const std::vector<double> thresholds = TrackThresholds(tracks, sigma_rad, options, units);
+  const std::vector<double> thresholds = TrackThresholds(tracks, sigma_rad, units);
   // The linear programs have one bound for all: that of the median track.
   units = WithThreshold(units, Median(thresholds, units.gamma), options);
   std::set<FrameId> views;
   int num_usable = 0;
   int num_moving = 0;
   ComponentOptions component_options;
-  component_options.min_shared_points = options.min_shared_points;
   component_options.min_parallax_rad = units.still_rad;
   if (options.use_epipolar_filter) {
     component_options.noise_rad =
@@ -323,7 +325,7 @@ void Solve(const RotationMap& cam_from_world,
     solution.message = "no track has two usable observations";
     return;
   }
-  if (num_moving < options.min_shared_points) {
+  if (num_moving < kMinSharedPoints) {
     solution.message = "no parallax: " + std::to_string(num_moving) + " of " +
                        std::to_string(num_usable) + " tracks move beyond what rotation explains";
     return;
@@ -331,7 +333,7 @@ void Solve(const RotationMap& cam_from_world,
   std::vector<ViewComponent> components = FindComponents(cam_from_world, tracks, component_options);
   if (components.empty()) {
     solution.message =
-        "no two views share " + std::to_string(options.min_shared_points) + " tracks with parallax";
+        "no two views share " + std::to_string(kMinSharedPoints) + " tracks with parallax";
     return;
   }
   int num_failed = 0;

@@ -6,6 +6,20 @@
 #include "rotodom/types/rotation.h"
 
 namespace rotslam {
+namespace {
+
+// Tracks under this parallax come into the linear programs last, for the sake of conditioning:
+// their depth is nearly sixty times their baseline.
+constexpr double kMinLpParallaxDeg = 1.0;
+// Below this flow beyond rotation a track says nothing of positions; noise and rotation error alone
+// reach a few px.
+constexpr double kStillParallaxPx = 4.0;
+// Observations further than this off the optical axis have no bounded image coordinates and stay
+// out of the linear programs (they are triangulated all the same). At 80 deg a pixel's bound has
+// grown by 33, the squared reciprocal of the cosine.
+constexpr double kMaxOffAxisDeg = 80.0;
+
+}  // namespace
 
 std::optional<std::string> KrotOptions::Problem() const {
   if (start != "l1" && start != "bisection" && start != "positioning") {
@@ -15,9 +29,6 @@ std::optional<std::string> KrotOptions::Problem() const {
     return "start is 'bisection', which needs use_bracket";
   }
   if (!(threshold_px > 0.0)) return OutOfRange("threshold_px", threshold_px, "above 0");
-  if (!(threshold_sigmas >= 0.0)) {
-    return OutOfRange("threshold_sigmas", threshold_sigmas, "at least 0");
-  }
   if (!(loose_factor >= 1.0)) return OutOfRange("loose_factor", loose_factor, "at least 1");
   if (max_bracket_views < 1)
     return OutOfRange("max_bracket_views", max_bracket_views, "at least 1");
@@ -25,23 +36,10 @@ std::optional<std::string> KrotOptions::Problem() const {
   if (observations_per_view < 4) {
     return OutOfRange("observations_per_view", observations_per_view, "at least 4");
   }
-  if (!(min_lp_parallax_deg >= 0.0)) {
-    return OutOfRange("min_lp_parallax_deg", min_lp_parallax_deg, "at least 0");
-  }
   if (!(min_point_angle_deg >= 0.0)) {
     return OutOfRange("min_point_angle_deg", min_point_angle_deg, "at least 0");
   }
-  if (!(still_parallax_px >= 0.0)) {
-    return OutOfRange("still_parallax_px", still_parallax_px, "at least 0");
-  }
-  if (min_shared_points < 3) {
-    return OutOfRange("min_shared_points", min_shared_points, "at least 3");
-  }
-  if (!(max_off_axis_deg > 0.0 && max_off_axis_deg < 90.0)) {
-    return OutOfRange("max_off_axis_deg", max_off_axis_deg, "between 0 and 90");
-  }
   if (num_threads < 1) return OutOfRange("num_threads", num_threads, "at least 1");
-  if (const auto trouble = robust_start.Problem()) return "robust_start." + *trouble;
   if (const auto trouble = bisection.Problem()) return "bisection." + *trouble;
   return std::nullopt;
 }
@@ -49,10 +47,10 @@ std::optional<std::string> KrotOptions::Problem() const {
 KrotUnits::KrotUnits(const KrotOptions& options, const Camera& camera)
     : focal_px(camera.MeanFocal()),
       gamma(options.threshold_px / focal_px),
-      still_rad(options.still_parallax_px / focal_px),
-      lp_parallax_rad(options.min_lp_parallax_deg * kRadFromDeg),
+      still_rad(kStillParallaxPx / focal_px),
+      lp_parallax_rad(kMinLpParallaxDeg * kRadFromDeg),
       point_angle_rad(options.min_point_angle_deg * kRadFromDeg),
       loose_rad(options.loose_factor * options.threshold_px / focal_px),
-      min_z(std::cos(options.max_off_axis_deg * kRadFromDeg)) {}
+      min_z(std::cos(kMaxOffAxisDeg * kRadFromDeg)) {}
 
 }  // namespace rotslam

@@ -5,7 +5,6 @@
 #include <string>
 
 #include "krot/bracket/bisection_options.h"
-#include "krot/initialisation/robust_start.h"
 #include "rotodom/camera/camera.h"
 
 namespace rotslam {
@@ -21,9 +20,6 @@ struct KrotOptions {
   // Image bound of the L1 start: observations within it cost nothing. It must cover feature noise
   // and rotation error together: 0.3 deg moves a point by 3.7 px at f = 700.
   double threshold_px = 4.0;
-  // Where orientations are less certain than that, the bound is this many standard deviations of a
-  // track's keypoints and of its views' orientations together.
-  double threshold_sigmas = 3.0;
   // Observations of triangulated points are kept up to this many thresholds. The positions are a
   // start, good to a few metres over 150: a tight test here throws good observations away.
   double loose_factor = 2.0;
@@ -40,46 +36,28 @@ struct KrotOptions {
   int max_lp_views = 150;
   // Observations per view in the start's programs.
   int observations_per_view = 40;
-  // Tracks under this parallax come into the linear programs last, for the sake of conditioning.
-  double min_lp_parallax_deg = 1.0;
   // Points of the answer are seen under at least this angle.
   double min_point_angle_deg = 0.5;
-  // Below this flow beyond rotation a track says nothing of positions; noise and rotation error
-  // alone reach a few px.
-  double still_parallax_px = 4.0;
-  // Known points a view must see to belong to a component.
-  int min_shared_points = 8;
   // Remove what contradicts the rotations pair by pair before anything else.
   bool use_epipolar_filter = true;
-  // Observations further than this off the optical axis have no bounded image coordinates and stay
-  // out of the linear programs (they are triangulated all the same).
-  double max_off_axis_deg = 80.0;
-  RobustStartOptions robust_start;
   BisectionOptions bisection;
   std::uint64_t seed = 1;
   int num_threads = 1;
 
   std::optional<std::string> Problem() const;
 
+  // Not configuration: the members that are not visited; programs and tests set them.
   template <class Visitor>
   void Visit(Visitor&& visit) {
     visit("start", start);
     visit("threshold_px", threshold_px);
-    visit("threshold_sigmas", threshold_sigmas);
-    visit("loose_factor", loose_factor);
     visit("use_bracket", use_bracket);
     visit("max_bracket_views", max_bracket_views);
     visit("max_lp_views", max_lp_views);
     visit("observations_per_view", observations_per_view);
-    visit("min_lp_parallax_deg", min_lp_parallax_deg);
     visit("min_point_angle_deg", min_point_angle_deg);
-    visit("still_parallax_px", still_parallax_px);
-    visit("min_shared_points", min_shared_points);
     visit("use_epipolar_filter", use_epipolar_filter);
-    visit("max_off_axis_deg", max_off_axis_deg);
-    visit("robust_start", robust_start);
     visit("bisection", bisection);
-    visit("seed", seed);
   }
 };
 
@@ -87,11 +65,11 @@ struct KrotOptions {
 struct KrotUnits {
   double focal_px;
   double gamma;            // threshold_px, normalised
-  double still_rad;        // still_parallax_px
-  double lp_parallax_rad;  // min_lp_parallax_deg
+  double still_rad;        // kStillParallaxPx
+  double lp_parallax_rad;  // kMinLpParallaxDeg
   double point_angle_rad;  // min_point_angle_deg
   double loose_rad;        // loose_factor * threshold_px
-  double min_z;            // cosine of max_off_axis_deg
+  double min_z;            // cosine of kMaxOffAxisDeg
 
   KrotUnits(const KrotOptions& options, const Camera& camera);
 };

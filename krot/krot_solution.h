@@ -55,7 +55,7 @@ struct KrotSolution {
   double gamma_low = 0.0;
   double gamma_high = kInfinity;
   // What the bracket covers: every observation that the triangulation from the start's positions
-  // kept (to loose_factor thresholds), nearer to the axis than max_off_axis_deg.
+  // kept (to loose_factor thresholds), less than 80 deg off the axis.
   int num_bracket_observations = 0;
   int num_bracket_tracks = 0;
   std::vector<ActiveObservation> active;    // of the component that has gamma_high

@@ -34,14 +34,11 @@ struct PureRotationOptions {
 
   std::optional<std::string> Problem() const;
 
+  // Not configuration: the members that are not visited; programs and tests set them.
   template <class Visitor>
   void Visit(Visitor&& visit) {
     visit("enabled", enabled);
-    visit("min_rotation_only_ratio", min_rotation_only_ratio);
-    visit("max_edge_span", max_edge_span);
-    visit("max_gap", max_gap);
     visit("min_frames", min_frames);
-    visit("still_sigmas", still_sigmas);
   }
 };
 

@@ -6,8 +6,10 @@
 #include <stdexcept>
 #include <utility>
 
+#include "krot/initialisation/robust_start.h"
 #include "krot/initialisation/selection.h"
 #include "krot/named_problem.h"
+#include "krot/structure/components.h"
 #include "krot/track_points.h"
 #include "rotodom/types/stopwatch.h"
 
@@ -149,8 +151,7 @@ CenterMap PlaceNewViews(const RotationMap& cam_from_world,
   const WindowProblem window = MakeWindow(cam_from_world, selected, part, depths);
   // The gauge is that of the known: the first view must be one.
   if (!part.centers.contains(window.named.views.front())) return {};
-  const RobustStart robust =
-      SolveRobustStart(window.named.problem, units.gamma, options.robust_start, &window.start);
+  const RobustStart robust = SolveRobustStart(window.named.problem, units.gamma, &window.start);
   solution.num_programs += robust.num_programs;
   if (robust.call != LpCallStatus::kCompleted) return {};
   const Eigen::Vector3d origin = part.centers.at(window.named.views.front());
@@ -162,7 +163,7 @@ CenterMap PlaceNewViews(const RotationMap& cam_from_world,
   CenterMap centers;
   for (std::size_t view = 0; view < window.named.views.size(); ++view) {
     if (window.named.problem.view_fixed[view]) continue;
-    if (num_fitting[view] < options.min_shared_points) continue;
+    if (num_fitting[view] < kMinSharedPoints) continue;
     centers[window.named.views[view]] =
         origin + robust.structure.center_in_world[view] / window.scale;
   }

@@ -342,12 +342,12 @@ MapViews KeyframeMapBuilder::ReadViews(const Reconstruction& map,
 
 // Null where the options or missing images rule out track completion.
 TrackCompletion KeyframeMapBuilder::CompletionByImages() const {
-  if (!options_.completion.enabled || images_ == nullptr) return nullptr;
+  if (!options_.track_completion.enabled || images_ == nullptr) return nullptr;
   return [this](const Reconstruction& map, const Camera& camera) {
     std::set<FrameId> frames;
     for (const auto& [frame, center] : map.center_in_world) frames.insert(frame);
     std::vector<Track> tracks = CompleteTracks(
-        map, ReadViews(map, frames), camera, options_.completion, options_.num_threads);
+        map, ReadViews(map, frames), camera, options_.track_completion, options_.num_threads);
     SetMotionBlur(camera, RatesOf(orientations_), options_.ba.blur_s_per_px, tracks);
     return tracks;
   };

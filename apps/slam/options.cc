@@ -17,7 +17,7 @@ std::optional<std::string> SlamOptions::Problem() const {
   if (auto problem = ProblemIn("keyframes", keyframes)) return problem;
   if (auto problem = ProblemIn("krot", krot)) return problem;
   if (auto problem = ProblemIn("ba", ba)) return problem;
-  if (auto problem = ProblemIn("completion", completion)) return problem;
+  if (auto problem = ProblemIn("track_completion", track_completion)) return problem;
   if (auto problem = ProblemIn("relocalisation", relocalisation)) return problem;
   if (auto problem = ProblemIn("resection", resection)) return problem;
   if (!(cloud_min_angle_deg >= 0.0)) {

@@ -43,7 +43,7 @@ struct SlamOptions {
   KeyframeOptions keyframes;
   KrotOptions krot;
   BundleOptions ba;
-  CompletionOptions completion;
+  CompletionOptions track_completion;
   RelocalisationOptions relocalisation;
   ResectionOptions resection;
   // Points whose rays meet at less than this stay out of the cloud: their depth is noise.
@@ -65,7 +65,7 @@ struct SlamOptions {
     visit("keyframes", keyframes);
     visit("krot", krot);
     visit("ba", ba);
-    visit("completion", completion);
+    visit("track_completion", track_completion);
     visit("relocalisation", relocalisation);
     visit("resection", resection);
     visit("cloud_min_angle_deg", cloud_min_angle_deg);

@@ -368,7 +368,7 @@ void ClassifyAll(const BundleRound& round,
       classifier.Classify(placement == Placement::kAnywhere, track);
     }
   });
-  RemoveWeakFrames(classifier, options.min_frame_observations, state);
+  RemoveWeakFrames(classifier, kMinFrameObservations, state);
 }
 
 double ResidualSpread(const BundleState& state) {

@@ -44,17 +44,11 @@ std::optional<std::string> BundleOptions::Problem() const {
   if (max_final_rounds < 1) {
     return OutOfRange("max_final_rounds", max_final_rounds, "at least 1");
   }
-  if (!(max_changed_share >= 0.0)) {
-    return OutOfRange("max_changed_share", max_changed_share, "at least 0");
-  }
   if (min_observations < 2) {
     return OutOfRange("min_observations", min_observations, "at least 2");
   }
   if (!(min_angle_deg > 0.0 && min_angle_deg < 90.0)) {
     return OutOfRange("min_angle_deg", min_angle_deg, "above 0 and below 90");
-  }
-  if (min_frame_observations < 3) {
-    return OutOfRange("min_frame_observations", min_frame_observations, "at least 3");
   }
   if (max_dense_frames < 0) return OutOfRange("max_dense_frames", max_dense_frames, "at least 0");
   if (num_threads < 1) return OutOfRange("num_threads", num_threads, "at least 1");

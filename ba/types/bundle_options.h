@@ -5,6 +5,10 @@
 
 namespace rotslam {
 
+/// A frame with fewer fitting observations is left out of a round: six unknowns on a handful of
+/// points follow any outlier. Twelve give four numbers for each unknown.
+inline constexpr int kMinFrameObservations = 12;
+
 /// One round of classification and minimisation.
 struct BundleRound {
   // Skip the round altogether.
@@ -32,17 +36,10 @@ struct BundleRound {
 
   std::optional<std::string> Problem() const;
 
+  // Not configuration: the members that are not visited; programs and tests set them.
   template <class Visitor>
   void Visit(Visitor&& visit) {
-    visit("enabled", enabled);
-    visit("refine_rotations", refine_rotations);
     visit("max_error_px", max_error_px);
-    visit("max_residual", max_residual);
-    visit("loss", loss);
-    visit("loss_scale", loss_scale);
-    visit("max_iterations", max_iterations);
-    visit("initial_radius", initial_radius);
-    visit("function_tolerance", function_tolerance);
   }
 };
 
@@ -74,6 +71,7 @@ struct LensOptions {
 
   std::optional<std::string> Problem() const;
 
+  // Not configuration: the members that are not visited; programs and tests set them.
   template <class Visitor>
   void Visit(Visitor&& visit) {
     visit("refine_distortion", refine_distortion);
@@ -82,7 +80,6 @@ struct LensOptions {
     visit("distortion_sigma", distortion_sigma);
     visit("focal_sigma", focal_sigma);
     visit("principal_sigma", principal_sigma);
-    visit("min_gain", min_gain);
   }
 };
 
@@ -120,10 +117,9 @@ struct BundleOptions {
   // Most likely by those of TUM fr1_rpy: 0.002, up to a blur of 1.4. 0: as certain in all
   // directions.
   double blur_s_per_px = 0.002;
-  // Closing is repeated, so many times at most, until classification changes less than this share
-  // of the observations: then the result does not depend on where it started.
+  // Closing is repeated, so many times at most, until classification changes next to nothing: then
+  // the result does not depend on where it started.
   int max_final_rounds = 5;
-  double max_changed_share = 5e-4;
   // false holds the rotations in every round: they come out bit by bit as they went in.
   bool refine_rotations = true;
   LensOptions lens;
@@ -139,9 +135,6 @@ struct BundleOptions {
   // of its position error, 0.05 deg gains nothing. At a focal length of 700 px, 0.2 deg is 2.4 px
   // of parallax. For clouds to look at see WithoutShallowPoints.
   double min_angle_deg = 0.2;
-  // A frame with fewer fitting observations is left out of a round: six unknowns on a handful of
-  // points follow any outlier.
-  int min_frame_observations = 12;
 
   // Up to this many frames the reduced system is factored densely (DENSE_SCHUR), above by CHOLMOD
   // (SPARSE_SCHUR).
@@ -153,9 +146,9 @@ struct BundleOptions {
   // The first field out of range, by name, value and limit; nullopt when all is well.
   std::optional<std::string> Problem() const;
 
+  // Not configuration: the members that are not visited; programs and tests set them.
   template <class Visitor>
   void Visit(Visitor&& visit) {
-    visit("bridge", bridge);
     visit("coarse", coarse);
     visit("fine", fine);
     visit("preparing_observations", preparing_observations);
@@ -163,14 +156,10 @@ struct BundleOptions {
     visit("limit_spreads", limit_spreads);
     visit("blur_s_per_px", blur_s_per_px);
     visit("max_final_rounds", max_final_rounds);
-    visit("max_changed_share", max_changed_share);
     visit("refine_rotations", refine_rotations);
     visit("lens", lens);
     visit("find_covariance", find_covariance);
-    visit("min_observations", min_observations);
     visit("min_angle_deg", min_angle_deg);
-    visit("min_frame_observations", min_frame_observations);
-    visit("max_dense_frames", max_dense_frames);
   }
 };
 

@@ -15,6 +15,12 @@
 namespace rotslam {
 namespace {
 
+// The interior programs start from about this many points in each view ...
+constexpr int kPointsPerView = 8;
+// ... and each round adds, for each view, this many of those that miss the bound most. Adding all
+// that miss it makes the programs explode.
+constexpr int kAddedPerView = 4;
+
 MinimaxStructure Restrict(const MinimaxStructure& structure, const std::vector<int>& points) {
   MinimaxStructure restricted;
   restricted.center_in_world = structure.center_in_world;
@@ -65,7 +71,7 @@ class Search {
         bracket_(bracket),
         groups_(problem),
         residuals_(problem.num_points, kInfinity),
-        chosen_(SpreadPoints(problem, options.points_per_view)) {
+        chosen_(SpreadPoints(problem, kPointsPerView)) {
     // What triangulation would cost is more than a few more points in the programs.
     constexpr int kFew = 100;
     if (problem.num_points <= kFew) chosen_.assign(problem.num_points, true);
@@ -153,7 +159,7 @@ class Search {
     const double limit = Limit();
     Triangulate(limit);
     misses_.clear();
-    if (AddWorstPoints(problem_, residuals_, limit, options_.added_per_view, chosen_) > 0) {
+    if (AddWorstPoints(problem_, residuals_, limit, kAddedPerView, chosen_) > 0) {
       TakeWorkingSet();
     } else {
       LowerTarget();
@@ -287,7 +293,7 @@ class Search {
 
   bool Prove(double gamma, const std::vector<double>& multipliers) {
     if (gamma <= bracket_.gamma_low) return true;
-    if (!CertifiesInfeasible(part_.problem, gamma, multipliers, options_.max_extent)) return false;
+    if (!CertifiesInfeasible(part_.problem, gamma, multipliers, kMaxExtent)) return false;
     bracket_.gamma_low = gamma;
     return true;
   }
@@ -333,7 +339,7 @@ class Search {
     constexpr int kMaxRounds = 4;
     for (int round = 0; round < kMaxRounds; ++round) {
       std::vector<bool> worst = chosen_;
-      AddWorstPoints(problem_, residuals_, limit, options_.added_per_view, worst);
+      AddWorstPoints(problem_, residuals_, limit, kAddedPerView, worst);
       bool moved = false;
       for (int i = 0; i < problem_.num_points; ++i) {
         if (!worst[i] || exact[i]) continue;

@@ -49,6 +49,10 @@ double NextGamma(const Bracket& bracket,
 
 }  // namespace
 
+// Below this bound the problem counts as solved exactly (normalised units; below the programs' own
+// accuracy).
+static constexpr double kZeroGamma = 1e-9;
+
 bool Continue(const BisectionOptions& options, const Bracket& bracket, int num_points) {
   if (!options.on_progress) return true;
   return options.on_progress(
@@ -57,7 +61,7 @@ bool Continue(const BisectionOptions& options, const Bracket& bracket, int num_p
 
 bool Narrow(const Bracket& bracket, const BisectionOptions& options, const SearchLimits& limits) {
   if (bracket.gamma_high == kInfinity) return false;
-  return bracket.gamma_high <= options.zero_gamma || bracket.gamma_high <= limits.gamma_of_others ||
+  return bracket.gamma_high <= kZeroGamma || bracket.gamma_high <= limits.gamma_of_others ||
          bracket.gamma_high - bracket.gamma_low <= options.relative_gap * bracket.gamma_high;
 }
 
@@ -108,7 +112,7 @@ Bracket BisectPrograms(const MinimaxProblem& problem,
       undecided_in_a_row = 0;
       continue;
     }
-    if (CertifiesInfeasible(problem, gamma, lp.multipliers, options.max_extent)) {
+    if (CertifiesInfeasible(problem, gamma, lp.multipliers, kMaxExtent)) {
       bracket.gamma_low = gamma;
       misses.push_back({gamma, lp.objective});
       undecided_in_a_row = 0;

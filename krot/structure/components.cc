@@ -48,7 +48,7 @@ std::optional<std::pair<FrameId, FrameId>> BestPair(const std::vector<Track>& tr
     }
   }
   std::optional<std::pair<FrameId, FrameId>> best;
-  int most = options.min_shared_points - 1;
+  int most = kMinSharedPoints - 1;
   for (const auto& [pair, count] : shared) {
     if (count <= most) continue;
     most = count;
@@ -98,7 +98,7 @@ class Grower {
     int nearest = 0;
     const int last = component_.views.back().value;
     for (const auto& [view, count] : num_known_) {
-      if (count < options_.min_shared_points) continue;
+      if (count < kMinSharedPoints) continue;
       const int distance = std::abs(view.value - last);
       if (best && distance >= nearest) continue;
       best = view;

@@ -8,11 +8,12 @@
 
 namespace rotslam {
 
+/// A view belongs to a component when it sees at least this many points known to it. Three
+/// determine a position with one to spare; more guard against chance.
+inline constexpr int kMinSharedPoints = 8;
+
 /// When views count as tied to each other.
 struct ComponentOptions {
-  // A view joins when it sees at least this many points known to the component. Three determine a
-  // position with one to spare; more guard against chance.
-  int min_shared_points = 8;
   // A track is a known point once two of the component's views see it under this parallax. Under
   // less, but more than noise makes, it counts by the square of its share of it: what many points
   // tell of the scale goes with the sum of their squared parallaxes.

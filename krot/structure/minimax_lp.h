@@ -57,6 +57,10 @@ MinimaxLpResult SolveL1Slack(const MinimaxProblem& problem,
                              const std::vector<double>& weights = {},
                              const LpOptions& options = {});
 
+/// Lower bounds exclude structures up to this many times their smallest depth, as large as a
+/// kilometre to a millimetre.
+inline constexpr double kMaxExtent = 1e6;
+
 /// True when `multipliers` prove, in double arithmetic with bounds on its rounding, that no
 /// structure has all residuals at most `gamma` and all depths positive. The proof does not depend
 /// on the LP engine: the multipliers are first corrected by weighted least squares so that sum_k

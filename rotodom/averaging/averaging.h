@@ -66,19 +66,12 @@ struct AveragingOptions {
 
   std::optional<std::string> Problem() const;
 
+  // Not configuration: the members that are not visited; programs and tests set them.
   template <class Visitor>
   void Visit(Visitor&& visit) {
     visit("mode", mode);
     visit("window", window);
-    visit("edge_floor_deg", edge_floor_deg);
-    visit("edge_error_factor", edge_error_factor);
-    visit("lasting_share", lasting_share);
-    visit("lasting_views", lasting_views);
-    visit("shared_noise", shared_noise);
     visit("loss_sigmas", loss_sigmas);
-    visit("l1_iterations", l1_iterations);
-    visit("min_step_deg", min_step_deg);
-    visit("max_iterations", max_iterations);
   }
 };
 

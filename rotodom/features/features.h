@@ -32,11 +32,10 @@ struct FeatureOptions {
 
   std::optional<std::string> Problem() const;
 
+  // Not configuration: the members that are not visited; programs and tests set them.
   template <class Visitor>
   void Visit(Visitor&& visit) {
     visit("max_features", max_features);
-    visit("num_levels", num_levels);
-    visit("scale_factor", scale_factor);
     visit("fast_threshold", fast_threshold);
     visit("min_fast_threshold", min_fast_threshold);
     visit("min_distance_px", min_distance_px);

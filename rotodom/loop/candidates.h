@@ -26,12 +26,10 @@ struct CandidateOptions {
 
   std::optional<std::string> Problem() const;
 
+  // Not configuration: the members that are not visited; programs and tests set them.
   template <class Visitor>
   void Visit(Visitor&& visit) {
     visit("recent_frames", recent_frames);
-    visit("common_words_ratio", common_words_ratio);
-    visit("group_score_ratio", group_score_ratio);
-    visit("group_size", group_size);
   }
 };
 

@@ -53,6 +53,16 @@ std::vector<std::array<int, 2>> MatchesOfFeatures(const std::vector<std::array<i
   return matches;
 }
 
+// With a rolling shutter, a frame during which the rotation's acceleration changes is distorted in
+// a way that is not known; beyond this, at the image's border, a steadier one becomes the place.
+// Half of what an edge may be uncertain by (VerificationOptions::max_sigma_deg).
+constexpr double kMaxShutterErrorDeg = 0.1;
+// A place sees the same scene as another when they have this many points in common, as many as a
+// relative rotation needs (RelativeRotationOptions::min_inliers).
+constexpr int kMinCommonPoints = 15;
+// Places around a candidate that are asked as well: each costs one more matching of descriptors.
+constexpr int kMaxNeighbours = 4;
+
 // Throws std::invalid_argument when an option is out of range.
 const LoopOptions& Checked(const LoopOptions& options) {
   if (const auto problem = options.Problem()) throw std::invalid_argument("loop: " + *problem);
@@ -69,14 +79,7 @@ std::optional<std::string> LoopOptions::Problem() const {
     return OutOfRange("min_correction_deg", min_correction_deg, "zero or more");
   }
   if (handover_frames < 0) return OutOfRange("handover_frames", handover_frames, "zero or more");
-  if (!(max_shutter_error_deg > 0.0)) {
-    return OutOfRange("max_shutter_error_deg", max_shutter_error_deg, "above 0");
-  }
-  if (min_common_points < 1) {
-    return OutOfRange("min_common_points", min_common_points, "at least 1");
-  }
   if (max_candidates < 1) return OutOfRange("max_candidates", max_candidates, "at least 1");
-  if (max_neighbours < 0) return OutOfRange("max_neighbours", max_neighbours, "zero or more");
   if (auto problem = ProblemIn("candidates", candidates)) return problem;
   return ProblemIn("verification", verification);
 }
@@ -221,7 +224,7 @@ bool LoopClosure::CorrectRollingShutter(const RotationMap& cam_from_world,
   const auto time_s = [&](FrameId frame) { return timestamps_s_.at(frame); };
   const auto [motion, error_rad] =
       EstimateMotionAt(corners.frame, cam_from_world, time_s, camera_.readout_s);
-  if (error_rad * kDegFromRad > options_.max_shutter_error_deg) return false;
+  if (error_rad * kDegFromRad > kMaxShutterErrorDeg) return false;
   MoveToMidFrame(camera_, motion, corners);
   return true;
 }
@@ -231,7 +234,7 @@ std::vector<FrameId> LoopClosure::NeighboursOf(const Place& place) const {
   for (auto older = places_.rbegin(); older != places_.rend(); ++older) {
     const int count = CountCommonTracks(older->second.tracks, place.tracks);
     // A lost track does not reappear, so older places have fewer common tracks.
-    if (count < options_.min_common_points) break;
+    if (count < kMinCommonPoints) break;
     common.emplace_back(count, older->first);
   }
   std::stable_sort(
@@ -257,7 +260,7 @@ LoopEvidence LoopClosure::Verify(const Place& place,
   const FrameId frame = place.corners.frame;
   std::vector<const Features*> old_places = {&places_.at(candidate.frame).corners};
   for (const FrameId neighbour : finder_.NeighboursOf(candidate.frame)) {
-    if (static_cast<int>(old_places.size()) > options_.max_neighbours) break;
+    if (static_cast<int>(old_places.size()) > kMaxNeighbours) break;
     if (neighbour != frame) old_places.push_back(&places_.at(neighbour).corners);
   }
   RotationRates rates;

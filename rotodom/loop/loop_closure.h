@@ -25,10 +25,6 @@ struct LoopOptions {
   // A frame that shares less than this part of its points with the last place is the next one.
   // More places find more loops and take more time and memory.
   double place_overlap = 0.5;
-  // With a rolling shutter, a frame during which the rotation's acceleration changes is distorted
-  // in a way that is not known; beyond this, at the image's border, a steadier one becomes the
-  // place.
-  double max_shutter_error_deg = 0.1;
   // A loop that turns the present orientation by less than this waits for the next one, or for the
   // end, before all orientations are averaged.
   double min_correction_deg = 0.2;
@@ -36,26 +32,20 @@ struct LoopOptions {
   // for some thousand frames at the pace of a camera. 0: at once, the stream waits. It also waits
   // where there is one thread.
   int handover_frames = 5;
-  // A place sees the same scene as another when they have this many points in common.
-  int min_common_points = 15;
-  // Candidates that are verified for one place, and places around each that are asked as well.
+  // Candidates that are verified for one place.
   int max_candidates = 3;
-  int max_neighbours = 4;
   CandidateOptions candidates;
   VerificationOptions verification;
 
   std::optional<std::string> Problem() const;
 
+  // Not configuration: the members that are not visited; programs and tests set them.
   template <class Visitor>
   void Visit(Visitor&& visit) {
     visit("use_loops", use_loops);
     visit("place_overlap", place_overlap);
-    visit("max_shutter_error_deg", max_shutter_error_deg);
-    visit("min_correction_deg", min_correction_deg);
     visit("handover_frames", handover_frames);
-    visit("min_common_points", min_common_points);
     visit("max_candidates", max_candidates);
-    visit("max_neighbours", max_neighbours);
     visit("candidates", candidates);
     visit("verification", verification);
   }

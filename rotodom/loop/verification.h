@@ -60,22 +60,11 @@ struct VerificationOptions {
 
   std::optional<std::string> Problem() const;
 
+  // Not configuration: the members that are not visited; programs and tests set them.
   template <class Visitor>
   void Visit(Visitor&& visit) {
     visit("min_inliers", min_inliers);
-    visit("min_inlier_ratio", min_inlier_ratio);
-    visit("max_sigma_deg", max_sigma_deg);
-    visit("max_witness_sigma_deg", max_witness_sigma_deg);
-    visit("blur_s_per_px", blur_s_per_px);
-    visit("shutter_sigma_deg", shutter_sigma_deg);
-    visit("max_cycle_deg", max_cycle_deg);
-    visit("max_cycle_sigmas", max_cycle_sigmas);
-    visit("min_edges", min_edges);
-    visit("min_witness_deg", min_witness_deg);
-    visit("sure_inliers", sure_inliers);
     visit("max_drift_deg", max_drift_deg);
-    visit("max_drift_deg_per_sqrt_frame", max_drift_deg_per_sqrt_frame);
-    visit("max_turn_error", max_turn_error);
   }
 };
 

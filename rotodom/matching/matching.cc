@@ -15,6 +15,9 @@ namespace rotslam {
 namespace {
 
 constexpr int kCellPx = 32;  // of the grid: near the search radius, so that few cells are visited
+// Pyramid levels that a feature may move between two frames: one is a factor of 1.2, more than the
+// distance to a point changes from frame to frame.
+constexpr int kMaxLevelStep = 1;
 
 // Keypoints of one frame by image cell.
 class KeypointGrid {
@@ -159,7 +162,7 @@ class Search {
 
  private:
   bool IsComparable(int level_i, int j) const {
-    return std::abs(features_j_.levels[j] - level_i) <= options_.max_level_step;
+    return std::abs(features_j_.levels[j] - level_i) <= kMaxLevelStep;
   }
 
   const Features& features_i_;
@@ -225,7 +228,6 @@ std::optional<std::string> MatchingOptions::Problem() const {
   if (max_distance < 0 || max_distance > 256)
     return OutOfRange("max_distance", max_distance, "0 to 256");
   if (!(ratio > 0.0 && ratio <= 1.0)) return OutOfRange("ratio", ratio, "above 0 and at most 1");
-  if (max_level_step < 0) return OutOfRange("max_level_step", max_level_step, "zero or more");
   return std::nullopt;
 }
 

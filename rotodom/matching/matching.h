@@ -25,19 +25,16 @@ struct MatchingOptions {
   int max_distance = 64;
   // The best candidate must be better than the second, if that lies elsewhere, by this ratio.
   double ratio = 0.85;
-  // Pyramid levels that a feature may move between two frames.
-  int max_level_step = 1;
 
   std::optional<std::string> Problem() const;
 
+  // Not configuration: the members that are not visited; programs and tests set them.
   template <class Visitor>
   void Visit(Visitor&& visit) {
     visit("radius_px", radius_px);
     visit("wide_radius_px", wide_radius_px);
-    visit("min_matches", min_matches);
     visit("max_distance", max_distance);
     visit("ratio", ratio);
-    visit("max_level_step", max_level_step);
   }
 };
 

@@ -24,18 +24,13 @@ struct BaselineTestOptions {
   // a direction. A point that is seen from d aside has moved by less where d is below this part of
   // its distance and the views are a radian apart.
   double lens_error = 0.001;
-  // Errors count up to this many standard deviations, shared errors included, so that a few wrong
-  // matches or a small moving object weigh little.
-  double clip_sigmas = 3.0;
 
   std::optional<std::string> Problem() const;
 
+  // Not configuration: the members that are not visited; programs and tests set them.
   template <class Visitor>
   void Visit(Visitor&& visit) {
     visit("false_alarm_rate", false_alarm_rate);
-    visit("anisotropy", anisotropy);
-    visit("lens_error", lens_error);
-    visit("clip_sigmas", clip_sigmas);
   }
 };
 

@@ -28,14 +28,24 @@ constexpr double kStartScatterDeg = 4.0;
 constexpr double kLargestExcess = 0.25;
 // Rotations closer than this count as the same: edges to other views cannot separate them.
 constexpr double kOtherRotationDeg = 2.0;
-// One more than the five degrees of freedom.
+// Finest scale at which hypotheses are told apart; well-refined matches scatter by 0.03 to 0.2 px.
+constexpr double kFinestPx = 0.1;
+// One more than the five degrees of freedom. Of these every other sample is, from all matches: more
+// would too often meet a wrong one.
 constexpr int kSmallSample = 6;
+// Matches per sample from those that nearly agree with the best hypothesis; fewer fail at small
+// baselines.
+constexpr int kLargeSample = 10;
+// Samples are drawn until a better hypothesis is less likely than one in a thousand, but no fewer
+// than these: the share of right matches is only guessed.
+constexpr double kConfidence = 0.999;
+constexpr int kMinSamples = 20;
 
-int SamplesNeeded(double inlier_ratio, int sample_size, double confidence, int max_samples) {
-  const double all_good = std::pow(std::clamp(inlier_ratio, 0.0, 1.0), sample_size);
+int SamplesNeeded(double inlier_ratio, int max_samples) {
+  const double all_good = std::pow(std::clamp(inlier_ratio, 0.0, 1.0), kSmallSample);
   if (all_good > 1.0 - 1e-9) return 1;
   if (all_good < 1e-12) return max_samples;
-  const double needed = std::log(1.0 - confidence) / std::log1p(-all_good);
+  const double needed = std::log(1.0 - kConfidence) / std::log1p(-all_good);
   return static_cast<int>(std::min<double>(max_samples, std::ceil(needed)));
 }
 
@@ -154,8 +164,8 @@ class Search {
         spread_(pairs.Thinned(kThinnedSize)),
         options_(options),
         threshold_(options.inlier_px / focal_px),
-        smallest_noise_(options.min_noise_px / focal_px),
-        finest_(options.finest_px / focal_px) {}
+        smallest_noise_(kMinNoisePx / focal_px),
+        finest_(kFinestPx / focal_px) {}
 
   const Consensus& best() const { return best_; }
 
@@ -222,7 +232,7 @@ class Search {
       const bool large = best_.num_samples % 2 == 0;
       const std::vector<int>& from = large ? agreeing_ : near_;
       const int num_from = static_cast<int>(from.size());
-      const int size = large ? options_.sample_size : kSmallSample;
+      const int size = large ? kLargeSample : kSmallSample;
       std::vector<int> drawn = sampler.Draw(std::min(size, num_from), num_from);
       for (int& index : drawn) index = from[index];
       const Rotation start = Rotation::Exp(kStartScatterDeg * kRadFromDeg * sampler.DrawInBall()) *
@@ -304,8 +314,7 @@ class Search {
     for (int k = 0; k < kScales; ++k) {
       if (k > 0 && IsKnown(model)) return std::nullopt;
       const double noise = NoiseOf(SquaredDistances(thinned_, model), threshold_, smallest_noise_);
-      model =
-          RefineEpipolar(thinned_, model, options_.loss_sigmas * noise, kIterations, 1e-3).model;
+      model = RefineEpipolar(thinned_, model, kLossSigmas * noise, kIterations, 1e-3).model;
     }
     minima_.push_back(model);
     return model;
@@ -326,9 +335,8 @@ class Search {
 
   int SamplesNeededNow() const {
     const double ratio = static_cast<double>(best_.num_inliers) / static_cast<double>(near_.size());
-    const int sample_size = kSmallSample;
-    const int needed = SamplesNeeded(ratio, sample_size, options_.confidence, options_.max_samples);
-    return std::max(needed, std::min(options_.min_samples, options_.max_samples));
+    const int needed = SamplesNeeded(ratio, options_.max_samples);
+    return std::max(needed, std::min(kMinSamples, options_.max_samples));
   }
 
   const PairArrays& pairs_;

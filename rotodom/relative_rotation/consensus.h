@@ -8,6 +8,13 @@
 
 namespace rotslam {
 
+/// No match is believed to be better than this, however well the matches agree: patches are aligned
+/// to 0.03 px on clean images (TrackPoints).
+inline constexpr double kMinNoisePx = 0.02;
+/// Scale of the redescending (Geman-McClure) loss in refinements, in standard deviations of the
+/// noise that the matches show: 3 in 1,000 right matches err by more.
+inline constexpr double kLossSigmas = 3.0;
+
 /// An epipolar model with its inliers.
 struct Consensus {
   EpipolarModel model;

@@ -14,6 +14,9 @@
 namespace rotslam {
 namespace {
 
+// Gauss-Newton steps on all matches at the end, at most; it stops before where steps vanish.
+constexpr int kRefineIterations = 12;
+
 // Selects the rotation independently of the test for a baseline. Where both models fit, as with a
 // narrow overlap after a large rotation, the rotation-only model would absorb a small baseline.
 // @param squared_distances, squared_flows  of all pairs under either model, rad^2.
@@ -98,14 +101,14 @@ std::optional<RelativeRotationEstimate> EstimateFrom(
     const RelativeRotationOptions& options,
     std::span<const KeypointCovariances> covariances) {
   const double threshold = options.inlier_px / focal_px;
-  const double smallest_noise = options.min_noise_px / focal_px;
+  const double smallest_noise = kMinNoisePx / focal_px;
   if (consensus.num_inliers < options.min_inliers) return std::nullopt;
   const PairArrays arrays(all, consensus.members);
 
-  const double loss = options.loss_sigmas *
-                      NoiseOf(SquaredDistances(arrays, consensus.model), threshold, smallest_noise);
+  const double loss =
+      kLossSigmas * NoiseOf(SquaredDistances(arrays, consensus.model), threshold, smallest_noise);
   const EpipolarFit epipolar =
-      RefineEpipolar(arrays, consensus.model, loss, options.refine_iterations, 1e-9);
+      RefineEpipolar(arrays, consensus.model, loss, kRefineIterations, 1e-9);
   RelativeRotationEstimate estimate;
   estimate.num_samples = consensus.num_samples;
   estimate.excess = consensus.excess;
@@ -125,7 +128,7 @@ std::optional<RelativeRotationEstimate> EstimateFrom(
   estimate.noise_px = noise * focal_px;
 
   const RotationFit rotation =
-      RefineRotation(arrays, epipolar.model.j_from_i, 2.0 * loss, options.refine_iterations);
+      RefineRotation(arrays, epipolar.model.j_from_i, 2.0 * loss, kRefineIterations);
   estimate.baseline = EvidenceOf(arrays,
                                  consensus.members,
                                  covariances,

@@ -12,11 +12,6 @@ struct RelativeRotationOptions {
   // A match counts for a hypothesis while its Sampson distance is below this; larger values let
   // wrong matches vote.
   double inlier_px = 1.5;
-  // Scale of the redescending (Geman-McClure) loss in the final refinement, in standard deviations
-  // of the noise that the matches show.
-  double loss_sigmas = 3.0;
-  // No match is believed to be better than this, however well the matches agree.
-  double min_noise_px = 0.02;
   // Part of a match's error that its neighbours share, so that the scatter does not show it:
   // patches deform as the view turns. A baseline must show more flow than this to count as
   // evidence, and a turn without a baseline is uncertain by half of it. Larger values take slow
@@ -24,20 +19,10 @@ struct RelativeRotationOptions {
   // wrong by 0.14 deg (chained RPE_1 0.032 to 0.040 deg; 0.005 to 0.006 at 0.02), while exact
   // rotations stay what they are (pan720: 0.0004 deg from 0.02 to 0.1).
   double shared_error_px = 0.02;
-  // Finest scale at which hypotheses are told apart; well-refined matches scatter by 0.03 to 0.2
-  // px.
-  double finest_px = 0.1;
-  // Matches per sample from those that nearly agree with the best hypothesis; fewer fail at small
-  // baselines. Every other sample is of six from all: more would too often meet a wrong one.
-  int sample_size = 10;
-  // Sampling stops when a better hypothesis is less likely than 1 - confidence, and at max_samples
-  // in any case. 250 take 0.9 ms; 400 failed a third less often on 500 matches half of which were
-  // wrong at baselines of 10 and 30 % of the depth (10 and 19 of 960).
-  double confidence = 0.999;
-  int min_samples = 20;
+  // Sampling stops after this many samples in any case. 250 take 0.9 ms; 400 failed a third less
+  // often on 500 matches half of which were wrong at baselines of 10 and 30 % of the depth (10 and
+  // 19 of 960).
   int max_samples = 250;
-  // Gauss-Newton steps on all matches at the end.
-  int refine_iterations = 12;
   // Fewer inliers than this are no measurement. The paper's theta_matches is 100; see
   // `ViewGraphOptions` for the threshold on edges.
   int min_inliers = 15;
@@ -46,19 +31,11 @@ struct RelativeRotationOptions {
 
   std::optional<std::string> Problem() const;
 
+  // Not configuration: the members that are not visited; programs and tests set them.
   template <class Visitor>
   void Visit(Visitor&& visit) {
     visit("inlier_px", inlier_px);
-    visit("loss_sigmas", loss_sigmas);
-    visit("min_noise_px", min_noise_px);
-    visit("shared_error_px", shared_error_px);
-    visit("finest_px", finest_px);
-    visit("sample_size", sample_size);
-    visit("confidence", confidence);
-    visit("min_samples", min_samples);
     visit("max_samples", max_samples);
-    visit("refine_iterations", refine_iterations);
-    visit("min_inliers", min_inliers);
     visit("baseline", baseline);
   }
 };

@@ -19,6 +19,13 @@
 namespace rotslam {
 namespace {
 
+// Sought from where it was found, a patch must come back to within this.
+constexpr double kMaxReturnPx = 0.5;
+// Patches are compared where both views see the point from about the same side and as near: a plane
+// that is turned by more, or larger by more, looks different.
+constexpr double kMaxAngleDeg = 30.0;
+constexpr double kMaxDistanceRatio = 1.5;
+
 // A view with its pose.
 struct PosedView {
   FrameId frame;
@@ -220,10 +227,10 @@ class Completion {
     const Eigen::Vector3d source_ray = point - source.center_in_world;
     const Eigen::Vector3d target_ray = point - target.center_in_world;
     const double ratio = source_ray.norm() / target_ray.norm();
-    if (!(ratio <= options_.max_distance_ratio && 1.0 <= ratio * options_.max_distance_ratio)) {
+    if (!(ratio <= kMaxDistanceRatio && 1.0 <= ratio * kMaxDistanceRatio)) {
       return std::nullopt;
     }
-    if (AngleRad(source_ray, target_ray) > options_.max_angle_deg * kRadFromDeg) {
+    if (AngleRad(source_ray, target_ray) > kMaxAngleDeg * kRadFromDeg) {
       return std::nullopt;
     }
     const auto there = PlaceOf(target, point);
@@ -243,7 +250,7 @@ class Completion {
     if ((found->center_px - there->image_px).norm() > options_.reach_px) return std::nullopt;
     const auto returned =
         Align({target.view->image, found->center_px, there->blur_px}, warp->inverse(), patch);
-    if (!returned || (returned->center_px - source_px).norm() > options_.max_return_px) {
+    if (!returned || (returned->center_px - source_px).norm() > kMaxReturnPx) {
       return std::nullopt;
     }
     return Eigen::Vector2d(found->center_px - (there->image_px - there->mid_frame_px));
@@ -262,13 +269,6 @@ std::optional<std::string> CompletionOptions::Problem() const {
   if (!(reach_px > 0.0)) return OutOfRange("reach_px", reach_px, "positive");
   if (!(min_correlation > 0.0 && min_correlation < 1.0)) {
     return OutOfRange("min_correlation", min_correlation, "above 0 and below 1");
-  }
-  if (!(max_return_px > 0.0)) return OutOfRange("max_return_px", max_return_px, "positive");
-  if (!(max_angle_deg > 0.0 && max_angle_deg < 90.0)) {
-    return OutOfRange("max_angle_deg", max_angle_deg, "above 0 and below 90");
-  }
-  if (!(max_distance_ratio >= 1.0)) {
-    return OutOfRange("max_distance_ratio", max_distance_ratio, "at least 1");
   }
   if (max_views < 1) return OutOfRange("max_views", max_views, "at least 1");
   return std::nullopt;

@@ -24,11 +24,6 @@ struct CompletionOptions {
   // Normalised correlation of the two patches. High: an observation too few costs little, a wrong
   // one is worth many.
   double min_correlation = 0.9;
-  // Sought from where it was found, a patch must come back to within this.
-  double max_return_px = 0.5;
-  // Patches are compared where both views see the point from about the same side and as near.
-  double max_angle_deg = 30.0;
-  double max_distance_ratio = 1.5;
   // A point is sought in so many of the views that are nearest to the one it is known by.
   int max_views = 200;
 
@@ -39,9 +34,6 @@ struct CompletionOptions {
     visit("enabled", enabled);
     visit("reach_px", reach_px);
     visit("min_correlation", min_correlation);
-    visit("max_return_px", max_return_px);
-    visit("max_angle_deg", max_angle_deg);
-    visit("max_distance_ratio", max_distance_ratio);
     visit("max_views", max_views);
   }
 };

@@ -280,11 +280,12 @@ class Search {
 // Correction of the predicted rotation by the majority of the probes.
 Rotation ProbeRotation(const Search& search,
                        const std::vector<Candidate>& candidates,
-                       const Camera& camera,
-                       int num_probes) {
+                       const Camera& camera) {
+  // Points that are sought first, over a longer way, to correct the predicted rotation: a tenth of
+  // the features, so that the correction costs less than the tracking that it saves.
+  constexpr std::size_t kNumProbes = 200;
   std::vector<BearingPair> pairs;
-  const std::size_t step =
-      std::max<std::size_t>(1, candidates.size() / static_cast<std::size_t>(num_probes));
+  const std::size_t step = std::max<std::size_t>(1, candidates.size() / kNumProbes);
   for (std::size_t k = 0; k < candidates.size(); k += step) {
     const auto expected_px = search.Expect(candidates[k]);
     if (!expected_px) continue;
@@ -303,7 +304,6 @@ std::optional<std::string> TrackingOptions::Problem() const {
   if (!(min_correlation >= 0.0 && min_correlation < 1.0)) {
     return OutOfRange("min_correlation", min_correlation, "0 or more and below 1");
   }
-  if (num_probes < 1) return OutOfRange("num_probes", num_probes, "at least 1");
   if (num_references < 1) return OutOfRange("num_references", num_references, "at least 1");
   if (min_points < 0) return OutOfRange("min_points", min_points, "zero or more");
   if (!(min_found_ratio >= 0.0 && min_found_ratio <= 1.0)) {
@@ -352,8 +352,7 @@ TrackingResult TrackPoints(std::span<const OrientedView> views,
   result.cam_from_world = target.cam_from_world;
   const std::vector<Candidate> candidates = FindCandidates(views, target.max_points);
   Search search(views, target, camera, options);
-  result.cam_from_world =
-      ProbeRotation(search, candidates, camera, options.num_probes) * target.cam_from_world;
+  result.cam_from_world = ProbeRotation(search, candidates, camera) * target.cam_from_world;
   search.SetOrientation(result.cam_from_world);
 
   constexpr int kChunk = 64;

@@ -20,8 +20,6 @@ struct TrackingOptions {
   // Normalised correlation that a patch must reach where it was found; less lets points slide onto
   // other things, more loses them in blur.
   double min_correlation = 0.7;
-  // Points that are sought first, over a longer way, to correct the predicted rotation.
-  int num_probes = 200;
   // Views whose patches a point is aligned with; its position is the mean. More average the noise
   // of the patches and cost time.
   int num_references = 2;
@@ -36,13 +34,12 @@ struct TrackingOptions {
 
   std::optional<std::string> Problem() const;
 
+  // Not configuration: the members that are not visited; programs and tests set them.
   template <class Visitor>
   void Visit(Visitor&& visit) {
     visit("min_correlation", min_correlation);
-    visit("num_probes", num_probes);
     visit("num_references", num_references);
     visit("min_points", min_points);
-    visit("min_found_ratio", min_found_ratio);
     visit("match_blur", match_blur);
   }
 };

@@ -32,11 +32,11 @@ struct KeyframeOptions {
 
   std::optional<std::string> Problem() const;
 
+  // Not configuration: the members that are not visited; programs and tests set them.
   template <class Visitor>
   void Visit(Visitor&& visit) {
     visit("min_parallax_deg", min_parallax_deg);
     visit("min_shared_ratio", min_shared_ratio);
-    visit("min_linked_ratio", min_linked_ratio);
     visit("min_keyframes", min_keyframes);
     visit("every_frames", every_frames);
   }

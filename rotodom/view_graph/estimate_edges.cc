@@ -142,16 +142,12 @@ std::optional<std::string> ViewGraphOptions::Problem() const {
   if (min_edge_inliers < 0) {
     return OutOfRange("min_edge_inliers", min_edge_inliers, "zero or more");
   }
-  if (!(min_inlier_ratio >= 0.0 && min_inlier_ratio < 1.0)) {
-    return OutOfRange("min_inlier_ratio", min_inlier_ratio, "0 or more and below 1");
-  }
   if (max_keyframe_edges < 0) {
     return OutOfRange("max_keyframe_edges", max_keyframe_edges, "zero or more");
   }
   if (!(keyframe_overlap > 0.0 && keyframe_overlap <= 1.0)) {
     return OutOfRange("keyframe_overlap", keyframe_overlap, "above 0 and at most 1");
   }
-  if (max_keyframes < 0) return OutOfRange("max_keyframes", max_keyframes, "zero or more");
   return std::nullopt;
 }
 

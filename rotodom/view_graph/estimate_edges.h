@@ -23,17 +23,11 @@ struct ViewGraphOptions {
   // edge takes the best one it has with at least RelativeRotationOptions::min_inliers, and is
   // flagged.
   int min_edge_inliers = 100;
-  // An edge needs this share of the points that both views show. Points are looked for where they
-  // are expected, so chance alone makes up to a third of wrong ones agree; of right ones nine in
-  // ten do, at old keyframes two in three.
-  double min_inlier_ratio = 0.5;
   // Edges to older keyframes, oldest first, as long as they share more than min_edge_inliers
   // points with the frame. They hold the drift where the camera stays in one place.
   int max_keyframe_edges = 3;
   // A frame that shares less than this part of its points with the last keyframe becomes the next.
   double keyframe_overlap = 0.7;
-  // Keyframes remembered.
-  int max_keyframes = 8;
 
   std::optional<std::string> Problem() const;
 
@@ -41,10 +35,8 @@ struct ViewGraphOptions {
   void Visit(Visitor&& visit) {
     visit("window_frames", window_frames);
     visit("min_edge_inliers", min_edge_inliers);
-    visit("min_inlier_ratio", min_inlier_ratio);
     visit("max_keyframe_edges", max_keyframe_edges);
     visit("keyframe_overlap", keyframe_overlap);
-    visit("max_keyframes", max_keyframes);
   }
 };
 

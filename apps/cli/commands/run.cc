@@ -1,4 +1,5 @@
 #include <chrono>
+#include <cstdio>
 #include <memory>
 #include <stdexcept>
 #include <utility>
@@ -6,6 +7,7 @@
 #include "apps/cli/command.h"
 #include "apps/cli/commands/track_input.h"
 #include "apps/cli/input/open_input.h"
+#include "apps/cli/input/option_texts.h"
 #include "apps/cli/input/run_options.h"
 #include "apps/cli/run_directory/checkpoint.h"
 #include "apps/cli/run_directory/run_directory.h"
@@ -146,6 +148,19 @@ int Run(const RunFlags& flags) {
                            ", positions are not: " + positions.failure);
 }
 
+// Prints the options as they would be used, and ends the program.
+void AddPrintConfigFlag(CLI::App& command, const RunFlags& flags) {
+  command.add_flag_callback(
+      "--print-config",
+      [&flags] {
+        RunOptions options = ReadRunOptions(flags.common, flags.input);
+        flags.krot.Override(options.krot);
+        std::fputs(OptionsAsYaml(ListOptions(options)).c_str(), stdout);
+        throw CLI::Success();
+      },
+      "Print all options as YAML for --config, with values, units and explanations, and end");
+}
+
 }  // namespace
 
 void AddRunCommand(CLI::App& app, Action& action) {
@@ -163,6 +178,8 @@ void AddRunCommand(CLI::App& app, Action& action) {
   command->add_flag("--ascii", flags->ascii, "Write the PLY files as text");
   AddReportFlag(*command, flags->use_report);
   AddCommonFlags(*command, flags->common);
+  // The last one: what stands in front of it is read first.
+  AddPrintConfigFlag(*command, *flags);
   command->footer("Example: rotslam run kitti/sequences/00 --out runs/kitti00");
   command->callback([flags, &action] { action = [flags] { return Run(*flags); }; });
 }

@@ -12,6 +12,7 @@
 
 #include <yaml-cpp/yaml.h>
 
+#include "apps/cli/input/former_options.h"
 #include "rotodom/types/text_file.h"
 
 namespace rotslam {
@@ -76,6 +77,7 @@ struct KnownKeys {
   }
 
   std::string Unknown(const std::string& key) const {
+    if (std::string former = FormerOption(key); !former.empty()) return former;
     const std::string nearest = Nearest(key);
     return "no option is called \"" + key + "\"" +
            (nearest.empty() ? "" : "; the nearest one is \"" + nearest + "\"");

@@ -18,7 +18,8 @@ namespace rotslam {
 /// not YAML. `what` says what the file should be ("options file").
 YAML::Node ReadYaml(const std::filesystem::path& path, const std::string& what);
 
-/// 'no option is called "matching.radius"; the nearest one is "matching.radius_px"'.
+/// 'no option is called "matching.radius"; the nearest one is "matching.radius_px"', or what became
+/// of a former option (FormerOption).
 std::string UnknownOption(const std::string& key, const std::vector<OptionRef>& options);
 
 /// Overrides the listed options by a YAML file whose maps are the options' groups:

@@ -1,5 +1,7 @@
 #include "apps/slam/map/cloud_outliers.h"
 
+#include <iterator>
+#include <memory>
 #include <stdexcept>
 #include <vector>
 
@@ -10,9 +12,15 @@
 #include "rotodom/types/options.h"
 
 namespace rotslam {
+namespace {
+
+// Neighbours whose mean distance says how alone a point is. Fewer follow the surface more closely
+// and take small groups of wrong points for surface.
+constexpr int kNumNeighbours = 16;
+
+}  // namespace
 
 std::optional<std::string> CloudOutlierOptions::Problem() const {
-  if (num_neighbours < 1) return OutOfRange("num_neighbours", num_neighbours, "one or more");
   if (!(max_sigmas > 0.0)) return OutOfRange("max_sigmas", max_sigmas, "above zero");
   return std::nullopt;
 }
@@ -21,9 +29,7 @@ PointMap WithoutOutliers(const PointMap& points, const CloudOutlierOptions& opti
   if (const auto problem = options.Problem()) {
     throw std::invalid_argument("WithoutOutliers: " + *problem);
   }
-  if (!options.remove || points.size() <= static_cast<std::size_t>(options.num_neighbours)) {
-    return points;
-  }
+  if (!options.remove || std::ssize(points) <= kNumNeighbours) return points;
   const auto cloud = std::make_shared<pcl::PointCloud<pcl::PointXYZ>>();
   cloud->reserve(points.size());
   for (const auto& [track, point] : points) {
@@ -32,7 +38,7 @@ PointMap WithoutOutliers(const PointMap& points, const CloudOutlierOptions& opti
   }
   pcl::StatisticalOutlierRemoval<pcl::PointXYZ> filter;
   filter.setInputCloud(cloud);
-  filter.setMeanK(options.num_neighbours);
+  filter.setMeanK(kNumNeighbours);
   filter.setStddevMulThresh(options.max_sigmas);
   pcl::Indices kept;
   filter.filter(kept);

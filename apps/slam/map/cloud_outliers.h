@@ -11,11 +11,9 @@ namespace rotslam {
 struct CloudOutlierOptions {
   // Whether points that stand alone leave the cloud.
   bool remove = true;
-  // Neighbours whose mean distance says how alone a point is. Fewer follow the surface more closely
-  // and take small groups of wrong points for surface.
-  int num_neighbours = 16;
-  // A point leaves when that distance is this many standard deviations above the mean over the
-  // cloud. Far points of a street are sparse by themselves: less takes them, too.
+  // A point leaves when its mean distance from its neighbours is this many standard deviations
+  // above the mean over the cloud. Far points of a street are sparse by themselves: less takes
+  // them, too.
   double max_sigmas = 3.0;
 
   std::optional<std::string> Problem() const;
@@ -23,13 +21,12 @@ struct CloudOutlierOptions {
   template <class Visitor>
   void Visit(Visitor&& visit) {
     visit("remove", remove);
-    visit("num_neighbours", num_neighbours);
     visit("max_sigmas", max_sigmas);
   }
 };
 
 /// Removes isolated points by PCL's StatisticalOutlierRemoval. All points are kept where the
-/// options say so or there are no more than `num_neighbours`.
+/// options say so or there are no more points than the neighbours asked for, 16.
 /// Throws std::invalid_argument when options.Problem().
 PointMap WithoutOutliers(const PointMap& points, const CloudOutlierOptions& options);
 

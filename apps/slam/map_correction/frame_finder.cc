@@ -15,6 +15,12 @@ namespace {
 constexpr int kMinCommonPoints = 15;
 // Neighbours of the match whose points are used as well.
 constexpr int kMaxNeighbours = 4;
+// A pose explains what it puts nearer to its corner than this: twice what bundle adjustment ends
+// with (BundleOptions::fine), since corners are found at whole pixels of their level.
+constexpr double kMaxErrorPx = 4.0;
+// A frame is displaced where another pose explains this many more than its present one, in standard
+// deviations of such a count, the square root of it. Chance exceeds four once in 30,000 frames.
+constexpr double kMinGainSigmas = 4.0;
 
 }  // namespace
 
@@ -183,7 +189,7 @@ std::vector<PointSighting> FrameFinder::SightingsOf(int map,
 bool FrameFinder::Explains(const ResectionStart& pose, const PointSighting& sighting) const {
   const auto pixel = camera_.Project(
       pose.cam_from_world * Eigen::Vector3d(sighting.point_in_world - pose.center_in_world));
-  return pixel && (*pixel - sighting.keypoint_px).norm() <= options_.max_error_px;
+  return pixel && (*pixel - sighting.keypoint_px).norm() <= kMaxErrorPx;
 }
 
 std::optional<FoundFrame> FrameFinder::FindPose(FrameId frame,
@@ -191,7 +197,7 @@ std::optional<FoundFrame> FrameFinder::FindPose(FrameId frame,
                                                 const std::vector<Sighted>& points) const {
   const std::vector<PointSighting> sightings = SightingsOf(map, points);
   ResectionOptions resection;
-  resection.max_error_px = options_.max_error_px;
+  resection.max_error_px = kMaxErrorPx;
   resection.min_inliers = options_.min_inliers;
   const std::uint64_t seed = seed_ + static_cast<std::uint64_t>(frame.value) * 7919U;
   const auto pose = FindAbsolutePose(camera_, sightings, resection, seed);
@@ -200,8 +206,8 @@ std::optional<FoundFrame> FrameFinder::FindPose(FrameId frame,
   found.frame = frame;
   found.num_inliers = pose->num_inliers;
   if (MapOf(frame) == map) Compare(points, sightings, *pose, found);
-  found.is_displaced = found.num_present + options_.min_gain_sigmas * std::sqrt(pose->num_inliers) <
-                       pose->num_inliers;
+  found.is_displaced =
+      found.num_present + kMinGainSigmas * std::sqrt(pose->num_inliers) < pose->num_inliers;
   found.is_right = found.is_right && !found.is_displaced;
   found.is_near = found.num_agreeing >= options_.min_inliers && !found.is_displaced;
   if (found.is_displaced) Describe(*pose, map, points, sightings, found);

@@ -82,6 +82,19 @@ TEST(LoadOptionsYaml, NamesTheNearestKnownKey) {
               HasSubstr("nearest one is \"matching.use_mutual\""));
 }
 
+TEST(LoadOptionsYaml, SaysWhatBecameOfFormerOptions) {
+  EXPECT_THAT(ErrorOf("matching:\nkrot: {loose_factor: 3}\n"),
+              HasSubstr("option is called \"krot\""));
+  EXPECT_EQ(UnknownOption("krot.loose_factor", {}),
+            "\"krot.loose_factor\" is fixed now; rotslam run --print-config lists the options");
+  for (const char* key : {"ba.bridge", "ba.bridge.loss", "options.ba.bridge.loss", "bridge.loss"}) {
+    EXPECT_THAT(UnknownOption(key, {}), HasSubstr("\" is fixed now")) << key;
+  }
+  EXPECT_EQ(UnknownOption("options.completion", {}),
+            "\"options.completion\" is called \"track_completion\" now");
+  EXPECT_THAT(UnknownOption("ba.bend", {}), HasSubstr("no option is called"));
+}
+
 TEST(LoadOptionsYaml, NamesKeyValueAndType) {
   EXPECT_THAT(ErrorOf("max_features: many\n"),
               HasSubstr("o.yaml:1: \"max_features\" expects a whole number, found \"many\""));

@@ -155,8 +155,6 @@ TEST(MatchingOptions, NamesTheFirstFieldOutOfRange) {
   EXPECT_TRUE(problem([](Options o) { o.min_matches = -1; }).starts_with("min_matches is -1"));
   EXPECT_TRUE(problem([](Options o) { o.max_distance = 257; }).starts_with("max_distance is 257"));
   EXPECT_TRUE(problem([](Options o) { o.ratio = 1.1; }).starts_with("ratio is 1.1"));
-  EXPECT_TRUE(
-      problem([](Options o) { o.max_level_step = -1; }).starts_with("max_level_step is -1"));
   MatchingOptions bad;
   bad.ratio = 0.0;
   EXPECT_THROW(MatchFeatures({}, {}, {}, SmallCamera(), bad), std::invalid_argument);

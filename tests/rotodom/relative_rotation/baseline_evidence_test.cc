@@ -131,8 +131,8 @@ TEST(TestBaseline, RefusesAnotherNumberOfCovariances) {
 TEST(BaselineTestOptions, NamesTheFirstFieldOutOfRange) {
   EXPECT_FALSE(BaselineTestOptions{}.Problem());
   RelativeRotationOptions options;
-  options.baseline.clip_sigmas = 0.0;
-  EXPECT_TRUE(options.Problem().value_or("none").find("clip_sigmas") != std::string::npos);
+  options.baseline.anisotropy = -1.0;
+  EXPECT_TRUE(options.Problem().value_or("none").find("anisotropy") != std::string::npos);
   options.baseline.false_alarm_rate = 1.0;
   EXPECT_TRUE(options.Problem().value_or("none").find("false_alarm_rate") != std::string::npos);
 }

@@ -384,9 +384,6 @@ TEST(CompleteTracks, RefusesOptionsOutOfRange) {
   EXPECT_FALSE(CompletionOptions().Problem().has_value());
   expect_refused({.reach_px = 0.0}, "reach_px");
   expect_refused({.min_correlation = 1.0}, "min_correlation");
-  expect_refused({.max_return_px = -1.0}, "max_return_px");
-  expect_refused({.max_angle_deg = 90.0}, "max_angle_deg");
-  expect_refused({.max_distance_ratio = 0.9}, "max_distance_ratio");
   expect_refused({.max_views = 0}, "max_views");
 }
 

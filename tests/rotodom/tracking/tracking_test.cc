@@ -397,12 +397,11 @@ TEST(TrackingOptions, NamesTheFirstFieldOutOfRange) {
   EXPECT_TRUE(
       problem([](Options o) { o.min_correlation = 1.0; }).starts_with("min_correlation is"));
   EXPECT_TRUE(problem([](Options o) { o.min_correlation = -0.1; }).starts_with("min_correlation"));
-  EXPECT_TRUE(problem([](Options o) { o.num_probes = 0; }).starts_with("num_probes is 0"));
   EXPECT_TRUE(problem([](Options o) { o.num_references = 0; }).starts_with("num_references is 0"));
   EXPECT_TRUE(problem([](Options o) { o.min_points = -1; }).starts_with("min_points is -1"));
   EXPECT_TRUE(problem([](Options o) { o.min_found_ratio = 1.5; }).starts_with("min_found_ratio"));
   TrackingOptions bad;
-  bad.num_probes = 0;
+  bad.num_references = 0;
   EXPECT_THROW(TrackPoints({}, {}, SmallCamera(), bad, 1), std::invalid_argument);
 }
 

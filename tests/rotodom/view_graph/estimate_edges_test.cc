@@ -199,8 +199,6 @@ TEST(CountCommonTracks, CountsWhatBothHave) {
 TEST(ViewGraphOptions, NamesTheFirstFieldOutOfRange) {
   EXPECT_FALSE(ViewGraphOptions{}.Problem());
   ViewGraphOptions options;
-  options.max_keyframes = -1;
-  EXPECT_EQ(options.Problem(), "max_keyframes is -1, must be zero or more");
   options.keyframe_overlap = 0.0;
   EXPECT_EQ(options.Problem(), "keyframe_overlap is 0, must be above 0 and at most 1");
   options.max_keyframe_edges = -2;

@@ -41,10 +41,8 @@ TEST(CloudOutliers, StayWhenAskedToOrWhenThereAreFewPoints) {
 
 TEST(CloudOutliers, RefuseOptionsOutOfRange) {
   CloudOutlierOptions options;
-  options.num_neighbours = 0;
-  EXPECT_THROW(WithoutOutliers({}, options), std::invalid_argument);
-  options = {};
   options.max_sigmas = 0.0;
+  EXPECT_THROW(WithoutOutliers({}, options), std::invalid_argument);
   EXPECT_EQ(options.Problem(), "max_sigmas is 0, must be above zero");
 }
 
