@@ -1,7 +1,12 @@
 #include "apps/slam/build_map.h"
 
 #include <algorithm>
+#include <array>
 #include <map>
+#include <optional>
+#include <set>
+#include <string>
+#include <utility>
 #include <vector>
 
 #include <gmock/gmock.h>
@@ -60,8 +65,23 @@ Scene Street() {
   options.num_views = 24;
   options.num_points = 1200;
   options.noise_px = 0.3;
-  options.rotation_noise_deg = 0.02;
+  options.rotation_noise_deg = 0.04;
   return MakeScene(options);
+}
+
+// Largest error of the turn from one keyframe to the next.
+double LargestTurnErrorDeg(const RotationMap& cam_from_world,
+                           const RotationMap& truth,
+                           const std::set<FrameId>& keyframes) {
+  double largest = 0.0;
+  FrameId before = *keyframes.begin();
+  for (const FrameId frame : keyframes) {
+    const Rotation found = cam_from_world.at(frame) * cam_from_world.at(before).Inverse();
+    const Rotation expected = truth.at(frame) * truth.at(before).Inverse();
+    largest = std::max(largest, (found * expected.Inverse()).AngleDeg());
+    before = frame;
+  }
+  return largest;
 }
 
 // Notes which stages begin and end.
@@ -95,6 +115,10 @@ TEST(BuildKeyframeMap, FindsCentresAndPointsUpToSimilarity) {
   const Similarity truth_from_map = AlignCenters(result.map.center_in_world, truth);
   EXPECT_LT(CompareCenters(result.map.center_in_world, truth, truth_from_map).max, 0.05)
       << "over 23 m";
+  const RotationMap& true_rotations = scene.true_cam_from_world;
+  EXPECT_LT(LargestTurnErrorDeg(result.map.cam_from_world, true_rotations, result.keyframes),
+            0.5 * LargestTurnErrorDeg(scene.cam_from_world, true_rotations, result.keyframes))
+      << "bundle adjustment improves orientations";
   EXPECT_GT(result.map.point_in_world.size(), 300U);
   EXPECT_TRUE(result.cloud.point_in_world.empty()) << "that is BuildMap's";
   using enum SlamStage;
