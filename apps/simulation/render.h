@@ -84,7 +84,7 @@ class PixelRays {
 /// boxes stand still during the readout.
 /// @param pose_at  pose as a function of time; evaluated at `time_s` and, with blur or a rolling
 ///                 shutter, around it.
-/// @param frame  number of the picture; determines its noise together with options.seed.
+/// @param frame    number of the picture; determines its noise together with options.seed.
 /// @return  CV_8UC1, or CV_8UC3 with options.color. A pure function of its arguments.
 /// Cost:    two to three tenths of a microsecond a pixel and sub-frame, one ray and about one
 /// texture

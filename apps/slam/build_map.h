@@ -15,8 +15,8 @@ namespace rotslam {
 /// Keyframes that share no tracks with depth form components, each with a scale of its own
 /// (`components`). AlignComponent joins them.
 /// @param orientations  with features kept.
-/// @param images  null: tracks are not completed, and the map is corrected with the places that the
-///                orientations hold alone.
+/// @param images        null: tracks are not completed, and the map is corrected with the places
+///                      that the orientations hold alone.
 /// @return  `failure` is set where there is no map.
 MapResult BuildMap(const Orientations& orientations,
                    const SlamOptions& options,

@@ -13,8 +13,9 @@ namespace rotslam {
 /// that fails, a frame of a pure-rotation segment takes the position of the end of the segment, and
 /// any other frame is interpolated in time.
 /// @param all_tracks  of all frames, those of the map's points among them.
-/// @param result  map, camera, segments and orientations of all frames, consistent with the map,
-///                must be set; receives the positions, refined orientations and the counts.
+/// @param result      map, camera, segments and orientations of all frames, consistent with the
+///                    map, must be set; receives the positions, refined orientations and the
+///                    counts.
 void RegisterFrames(const Orientations& orientations,
                     const std::vector<Track>& all_tracks,
                     const SlamOptions& options,

@@ -28,9 +28,9 @@ struct GivenRotations {
 
 /// The given orientations at the times of the frames, interpolated over gaps of at most 0.2 s.
 /// @param timestamps_s  by frame id.
-/// @param graph  relative rotations measured in the images. Given orientations that fit them far
-///               better in another convention (inverse, other axes) are refused with an error that
-///               names the convention.
+/// @param graph         relative rotations measured in the images. Given orientations that fit them
+///                      far better in another convention (inverse, other axes) are refused with an
+///                      error that names the convention.
 /// Throws std::runtime_error with one line where orientations are missing for some frames or follow
 /// another convention.
 GivenRotations MatchGivenRotations(const OrientationsFromElsewhere& given,

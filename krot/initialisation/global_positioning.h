@@ -10,7 +10,7 @@ namespace rotslam {
 /// observations, with v the ray and s > 0 the inverse depth, each squared distance d^2 entering as
 /// d^2 / (1 + d^2 / loss_rad^2). It starts with equal depths and needs no initial structure, and is
 /// independent of the linear programs.
-/// @param problem  may contain outliers, more than a tenth, but nothing fixed.
+/// @param problem   may contain outliers, more than a tenth, but nothing fixed.
 /// @param loss_rad  angle between observation and ray beyond which an observation is an outlier;
 ///                  above 0.
 /// @return  nullopt for fewer than two views, or where a system cannot be solved. The first centre

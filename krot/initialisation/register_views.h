@@ -21,8 +21,8 @@ struct RegistrationOptions {
 
 /// Resection-intersection: registers views one by one from the points known so far, then
 /// triangulates the tracks that each of them completes.
-/// @param order  views to register, in order of preference. A view with too few known points is
-///               deferred, and the view with the most known points comes first instead.
+/// @param order    views to register, in order of preference. A view with too few known points is
+///                 deferred, and the view with the most known points comes first instead.
 /// @param centers  known centres; receives the new ones.
 /// @return  views that could not be registered, in the order given.
 std::vector<FrameId> RegisterViews(const RotationMap& cam_from_world,

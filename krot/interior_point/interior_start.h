@@ -15,9 +15,9 @@ double Complementarity(const Iterate& at) {
 
 /// Sets the first slack s, rows r and multipliers y at a point that is set in `at`: all rows are
 /// positive, all products y r are equal, and sum sigma_k y_k is one.
-/// @param program  has size(), the number of observations, and Sigma(o), the coefficients of s in
-///                 the rows of one observation.
-/// @param margin  smallest value of a row, in units of s.
+/// @param program      has size(), the number of observations, and Sigma(o), the coefficients of s
+///                     in the rows of one observation.
+/// @param margin       smallest value of a row, in units of s.
 /// @param update_rows  computes the rows at a point and its s.
 template <typename Program, typename Iterate, typename UpdateRows>
 void StartRows(const Program& program, double margin, const UpdateRows& update_rows, Iterate& at) {

@@ -21,8 +21,8 @@ struct L1InteriorOptions {
 /// Solves the program of SolveL1Slack by a specialised interior-point method, which eliminates the
 /// slacks and points and factors the centres' system.
 /// @param weights  weight of each observation's slack, positive; empty: all one.
-/// @param start  first iterate and the values of fixed views and points; required when there are
-///               any. The bound of one on the smallest depth applies to its scale as well.
+/// @param start    first iterate and the values of fixed views and points; required when there are
+///                 any. The bound of one on the smallest depth applies to its scale as well.
 /// @return  kCompleted when the tolerance was reached. Multipliers are those of the last iterate.
 ///          Throws std::invalid_argument as SolveL1Slack does.
 /// Cost:    20 to 60 iterations of a StructureSystem, up to 150 for some long paths, 10 to 20 from

@@ -26,7 +26,7 @@ inline Five Recentred(const Five& product, double mu) {
 }
 
 /// Recentres a step while that increases its length, at most `max_times`; Gondzio 1996.
-/// @param reach_of  computes the Reach of a step.
+/// @param reach_of   computes the Reach of a step.
 /// @param recentred  computes, from a step and an aim, the step with the products recentred at its
 ///                   end when it is scaled to `aim`, which is beyond its reach.
 template <typename Step, typename ReachOf, typename RecentredStep>

@@ -14,7 +14,7 @@ namespace rotslam {
 /// interpolated by frame number, and then averaged; averaging alone would keep a start that is far
 /// off.
 /// @param cam_from_world  orientations of all views before.
-/// @param refined  refined orientations of some of these views.
+/// @param refined         refined orientations of some of these views.
 /// Throws std::invalid_argument when none is refined or an option is out of range.
 RotationMap FollowAnchors(const ViewGraph& graph,
                           const RotationMap& cam_from_world,

@@ -85,7 +85,7 @@ std::set<FrameId> ViewsToAverage(const RotationMap& cam_from_world,
 /// covariances.
 /// @param cam_from_world  start values, and the anchors: every view that is not free. Edges to
 ///                        views without an orientation are ignored.
-/// @param free_views  views to average. Without an edge to an anchor, the oldest one is fixed.
+/// @param free_views      views to average. Without an edge to an anchor, the oldest one is fixed.
 /// @return  the new orientations of `free_views` only.
 /// Error:   the cost's minimum nearest to the start, to min_step_deg.
 /// Cost:    one solution for 3 |free_views| unknowns per iteration (EdgeSystem); 10 free views with

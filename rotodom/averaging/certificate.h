@@ -33,9 +33,10 @@ struct AveragingCertificate {
 /// and the smallest such epsilon found by bisection to a factor of two.
 /// @param weights  by edge, zero or more; zero leaves an edge out.
 /// Throws std::invalid_argument when the sizes differ, a weight is negative or an edge's view has
-/// no orientation. Error:   eigenvalues to 1e-12 of the largest weight of a view. Cost:    some
-/// twenty Cholesky factorisations of 3 n unknowns. Source:  Eriksson et al., Rotation Averaging and
-/// Strong Duality, CVPR 2018; Rosen, Scalable
+/// no orientation.
+/// Error:   eigenvalues to 1e-12 of the largest weight of a view.
+/// Cost:    some twenty Cholesky factorisations of 3 n unknowns.
+/// Source:  Eriksson et al., Rotation Averaging and Strong Duality, CVPR 2018; Rosen, Scalable
 ///          Low-Rank Semidefinite Programming for Certifiably Correct Machine Perception, 2022, for
 ///          the factorisation as a test.
 AveragingCertificate CertifyAveraging(std::span<const RelativeRotation> edges,

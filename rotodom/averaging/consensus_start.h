@@ -22,14 +22,15 @@ struct ConsensusStart {
 /// that wrong edges are left out.
 ///
 /// 1. An edge is confirmed if it closes a triangle, or else a cycle of four, with the identity;
-/// wrong edges rarely do so by chance.
+///    wrong edges rarely do so by chance.
 /// 2. The tree of shortest paths is built: as few unconfirmed edges as possible, then least
-/// variance.
+///    variance.
 /// 3. An edge outside the tree that agrees with it confirms its whole cycle. Several edges between
-/// two groups of confirmed views are confirmed where they agree on the rotation between the groups.
-/// Steps 2 and 3 are repeated until no edge is confirmed, with random choices of unconfirmed edges.
+///    two groups of confirmed views are confirmed where they agree on the rotation between the
+///    groups. Steps 2 and 3 are repeated until no edge is confirmed, with random choices of
+///    unconfirmed edges.
 /// 4. Where many edges contradict the result, 2 and 3 are repeated with other trees, and the tree
-/// with the fewest contradictions is kept.
+///    with the fewest contradictions is kept.
 ///
 /// In a component of the graph without a fixed view the root is at the identity.
 /// Cost:    O(E log E) a round for E edges, some five rounds, up to five times that below 10,000

@@ -40,7 +40,7 @@ class EdgeSystem {
 
   /// @param cam_from_world  orientations; the first `num_free` are unknowns, the others are fixed.
   /// @param loss_sigmas     scale of the Geman-McClure loss, in standard deviations.
-  /// @param num_threads  used for large systems; the result does not depend on it.
+  /// @param num_threads     used for large systems; the result does not depend on it.
   EdgeSystem(std::vector<Eigen::Quaterniond> cam_from_world,
              int num_free,
              double loss_sigmas,

@@ -29,15 +29,16 @@ struct SupportedEdge {
 /// the anchors and of the edges. Their covariance follows from those two ("sandwich" estimator). It
 /// differs from the inverse of the normal equations in four ways:
 /// - Edges share noise. Half of an edge's covariance comes from the keypoint noise in either frame;
-/// two edges with a common frame share the noise of their common keypoints. Along a track the noise
-/// of the frames in between cancels; over several edges of one frame it does not average out.
+///   two edges with a common frame share the noise of their common keypoints. Along a track the
+///   noise of the frames in between cancels; over several edges of one frame it does not average
+///   out.
 /// - Tracked patches slide slowly. This error accumulates at a slowly changing rate, so that edges
-/// over the same or neighbouring frames share it, and along a track it adds up
-/// (AveragingOptions::lasting_share).
+///   over the same or neighbouring frames share it, and along a track it adds up
+///   (AveragingOptions::lasting_share).
 /// - Weights of the robust loss and edge_floor_deg determine the influence of an edge, not its
-/// error.
+///   error.
 /// - Anchors are uncertain, and correlated with each other and with their edges. A view that leaves
-/// the window keeps its covariance and its part in the edges that are kept.
+///   the window keeps its covariance and its part in the edges that are kept.
 /// Memory and time do not depend on the length of the sequence: a fixed view is dropped once it has
 /// had no new edge for the length of a window.
 /// Cost:    0.05 ms a frame at 10 free views with 5 edges each, the covariances of the newest view
@@ -53,11 +54,11 @@ class OrientationCovariance {
   explicit OrientationCovariance(const AveragingOptions& options);
 
   /// Adds a new view after the orientations have been averaged.
-  /// @param edges  new edges of `view` to older views; with averaging off the one edge that it is
-  ///               chained to. Edges to dropped views are ignored.
+  /// @param edges           new edges of `view` to older views; with averaging off the one edge
+  ///                        that it is chained to. Edges to dropped views are ignored.
   /// @param cam_from_world  averaged orientations.
-  /// @param free_views  the averaged views; with mode global the newest options.window views, with
-  ///                    mode off `view` alone.
+  /// @param free_views      the averaged views; with mode global the newest options.window views,
+  ///                        with mode off `view` alone.
   /// The orientation of a view without an edge, other than the first one, is unknown.
   void AddView(FrameId view,
                std::span<const SupportedEdge> edges,

@@ -85,10 +85,11 @@ ImagePyramid BuildPyramid(const cv::Mat& grey, const FeatureOptions& options);
 
 /// Detects corners where `features` has none, up to options.max_features in all, evenly spread.
 /// @param num_threads  works on levels side by side; the result does not depend on it.
-/// @param features  n features carried over from earlier frames (keypoints_px, bearings, levels and
-///                  rgb of equal length), or none. They keep their positions in the lists; new ones
-///                  are appended, ordered by level, row and column, at whole pixels of their level,
-///                  with the grey value as colour. Angles and descriptors are not changed.
+/// @param features     n features carried over from earlier frames (keypoints_px, bearings, levels
+///                     and rgb of equal length), or none. They keep their positions in the lists;
+///                     new ones are appended, ordered by level, row and column, at whole pixels of
+///                     their level, with the grey value as colour. Angles and descriptors are not
+///                     changed.
 /// Corners for which the camera model has no bearing are left out. Each part of a level has a share
 /// of the features, and carried features count towards it.
 /// Source:  Rublee et al., ORB, ICCV 2011. Ours selects the FAST corners of a level in rounds over

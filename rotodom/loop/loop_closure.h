@@ -99,7 +99,7 @@ class LoopClosure {
   /// it: only now is its angular velocity known, which a rolling shutter needs.
   /// @param image           the frame's.
   /// @param cam_from_world  present orientations of all frames so far.
-  /// @param pieces  connected components of the view-graph, by frame.
+  /// @param pieces          connected components of the view-graph, by frame.
   LoopReport AddFrame(const FrameEstimate& estimate,
                       const cv::Mat& image,
                       const RotationMap& cam_from_world,
@@ -114,7 +114,7 @@ class LoopClosure {
   /// Replays a frame from the results of AddFrame, without the image and without searching for
   /// loops.
   /// @param corners  NewestCorners() at that time.
-  /// @param report  the result for the frame before.
+  /// @param report   the result for the frame before.
   void Replay(const FrameEstimate& estimate,
               std::optional<Features> corners,
               const LoopReport& report,

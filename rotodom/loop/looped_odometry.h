@@ -37,7 +37,7 @@ struct FrameRecord;
 class LoopedOdometry {
  public:
   /// Throws std::invalid_argument when an option or the camera is out of range.
-  /// @param vocabulary  null: DefaultVocabulary.
+  /// @param vocabulary     null: DefaultVocabulary.
   /// @param keep_features  for tracks.
   LoopedOdometry(const Camera& camera,
                  const OdometryOptions& odometry,

@@ -25,7 +25,7 @@ class UnconfirmedEdges {
   /// are at least options.min_edges, at frames whose directions differ by options.min_witness_deg,
   /// with options.sure_inliers matches in all.
   /// @param cam_from_world  present orientations of all views.
-  /// @param pieces  components by frame; `connection` links two of them.
+  /// @param pieces          components by frame; `connection` links two of them.
   std::vector<EdgeWithMatches> Confirmed(const EdgeWithMatches& connection,
                                          const RotationMap& cam_from_world,
                                          const DisjointSets& pieces) const;

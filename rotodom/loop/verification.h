@@ -110,13 +110,13 @@ struct VerificationTools {
 /// Verifies a candidate geometrically: matches descriptors and estimates relative rotations as the
 /// odometry does, and tests whether enough of the edges are consistent with each other and with the
 /// orientations between the two places.
-/// @param view             described features of the present place.
-/// @param old_places       described features; the candidate first, then its neighbours, if any.
-/// @param cam_from_world   present orientations of all of them, and of the frames in between.
-/// @param rates  angular velocities of the view and of old places, where known.
-/// @param num_consistent   as in LoopCandidate.
-/// @param are_linked  the two places are in one component of the view-graph, so that their
-///                    orientations are wrong by drift only.
+/// @param view            described features of the present place.
+/// @param old_places      described features; the candidate first, then its neighbours, if any.
+/// @param cam_from_world  present orientations of all of them, and of the frames in between.
+/// @param rates           angular velocities of the view and of old places, where known.
+/// @param num_consistent  as in LoopCandidate.
+/// @param are_linked      the two places are in one component of the view-graph, so that their
+///                        orientations are wrong by drift only.
 LoopEvidence VerifyLoop(const Features& view,
                         std::span<const Features* const> old_places,
                         const RotationMap& cam_from_world,

@@ -24,7 +24,7 @@ inline constexpr double kFarthestFrame_s = 0.15;
 
 /// Angular velocity at a frame from its orientation and the two orientations of others that are
 /// nearest in time.
-/// @param others  at different times; one at the frame's own time is ignored.
+/// @param others      at different times; one at the frame's own time is ignored.
 /// @param farthest_s  others beyond this time are ignored, s.
 /// @return  nullopt where none is left.
 std::optional<Eigen::Vector3d> RateThrough(const TimedOrientation& frame,
@@ -44,7 +44,7 @@ RotationRates RatesOf(const RotationMap& cam_from_world,
 
 /// Blur vector of a keypoint caused by a rotation during the exposure, as in Observation::blur,
 /// without a limit of its length.
-/// @param rate            rad/s, in camera axes.
+/// @param rate           rad/s, in camera axes.
 /// @param blur_s_per_px  length of the blur vector per image speed in px/s.
 /// @return  zero where the camera does not see the bearing.
 Eigen::Vector2d BlurVectorOf(const Camera& camera,

@@ -19,7 +19,7 @@ struct EpipolarFit {
 /// its cost.
 /// @param loss            scale of the loss, rad.
 /// @param max_iterations  steps tried, rejected ones among them.
-/// @param tolerance  stop when the predicted decrease of the cost is below this share of it.
+/// @param tolerance       stop when the predicted decrease of the cost is below this share of it.
 EpipolarFit RefineEpipolar(const PairArrays& pairs,
                            const EpipolarModel& start,
                            double loss,

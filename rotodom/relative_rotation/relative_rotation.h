@@ -42,12 +42,12 @@ struct RelativeRotationEstimate {
 /// redescending loss. TestBaseline decides whether there is a baseline, and Torr's geometric
 /// information criterion selects the rotation; the two may disagree for baselines at the limit of
 /// detection. Matches with a MatchNoise are weighted by it throughout.
-/// @param pairs  matched bearings with outliers. A bearing that is not finite or an invalid
-///               covariance throws std::invalid_argument.
-/// @param predicted_j_from_i   where to start; may be far off.
-/// @param focal_px             pixels per radian, for the thresholds.
-/// @param seed  equal seeds give equal results.
-/// @param covariances  one per pair, or none; used by the test of the baseline only.
+/// @param pairs               matched bearings with outliers. A bearing that is not finite or an
+///                            invalid covariance throws std::invalid_argument.
+/// @param predicted_j_from_i  where to start; may be far off.
+/// @param focal_px            pixels per radian, for the thresholds.
+/// @param seed                equal seeds give equal results.
+/// @param covariances         one per pair, or none; used by the test of the baseline only.
 /// @return  nullopt when fewer than options.min_inliers matches agree or they do not determine the
 ///          rotation.
 /// Error:   medians of 80 scenes, 1,000 matches, 0.5 px at f = 700, 0 / 25 / 50 % outliers: 0.005 /

@@ -41,7 +41,8 @@ struct ReadoutEstimate {
 /// the orientations and by the remaining flow, which is parallax and errors of the orientations.
 /// With orientations alone the readout of a hand-held camera comes out too short, because the scene
 /// moves against the rotation.
-/// @param frames  with consecutive ids; the motion follows from a frame's neighbours in time.
+/// @param frames          with consecutive ids; the motion follows from a frame's neighbours in
+///                        time.
 /// @param graph           edges between them.
 /// @param cam_from_world  one per frame.
 /// @return  nullopt where pairs are too few, rotate too evenly or do not agree on a readout below

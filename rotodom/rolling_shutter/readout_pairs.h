@@ -57,7 +57,7 @@ double MedianPeriod(const std::map<FrameId, SeenPoints>& frames);
 /// Selects the pairs of views that are most informative about the readout, 300 to 600 where there
 /// are as many, in order of time: different rotation rates, small noise of the matches, known
 /// motion, at least 50 common points.
-/// @param frames  this and the following arguments are those of EstimateReadout.
+/// @param frames     this and the following arguments are those of EstimateReadout.
 /// @param longest_s  upper bound of the readout, s.
 std::vector<ViewPair> SelectReadoutPairs(const Camera& camera,
                                          const std::map<FrameId, SeenPoints>& frames,

@@ -59,7 +59,7 @@ MapView MakeMapView(const cv::Mat& image);
 /// with that of a reference view, which sees the point from the middle of the others. A tracker
 /// works from image to image, so that its errors add up and lost points stay lost. Where the map is
 /// accurate to a few pixels, both can be corrected.
-/// @param map  the tracks hold inliers only.
+/// @param map    the tracks hold inliers only.
 /// @param views  of frames with poses, or some of them.
 /// @return  the map's tracks in the same order with the observations found. An observation of the
 ///          tracker is replaced where the point was found near it, and else kept.

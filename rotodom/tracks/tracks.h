@@ -20,10 +20,10 @@ struct EdgeMatches {
 /// Joins pairwise matches into tracks (union-find). A match that would put two keypoints of one
 /// frame into a track is dropped. Earlier edges take precedence, so pass the most reliable ones
 /// first.
-/// @param features        of every frame that an edge names.
+/// @param features       of every frame that an edge names.
 /// @param observed_from  only observations in these frames are returned; those in other frames
 ///                       still join tracks.
-/// @param min_length      tracks with fewer observations are left out.
+/// @param min_length     tracks with fewer observations are left out.
 /// @return  tracks with consecutive ids, ordered by their first frame and keypoint.
 /// Cost:    near-linear in the number of matches.
 std::vector<Track> BuildTracks(const std::vector<EdgeMatches>& edges,

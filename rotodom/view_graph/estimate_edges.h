@@ -56,7 +56,7 @@ struct EdgeOptions {
 
 /// Estimates the edge between two views from matched keypoints.
 /// @param keypoints  of view_i and of view_j.
-/// @param noise  one for each of them; none: all are equal.
+/// @param noise      one for each of them; none: all are equal.
 /// @return  nullopt when fewer than relative_rotation.min_inliers of them agree.
 std::optional<EdgeWithMatches> EstimateEdge(const Features& view_i,
                                             const Features& view_j,

@@ -26,8 +26,15 @@ struct AlignmentSources {
 /// Applies a similarity to the orientations, centres and points of a map.
 Reconstruction Moved(const Reconstruction& part, const Similarity& similarity);
 
-/// Aligns `part` with the components placed before it, where no measurement tells their relative
+/// Aligns `part` with the components placed before it, where no measurement gives their relative
 /// scale.
+///
+/// Scale: the median distance of the points seen by the keyframes within 30 frames of the boundary
+/// is equal on both sides. Speed would be a worse measure: rotations and stops change it tenfold
+/// (docs/gimbal.md). Place: within a pure-rotation segment the part begins where the other one
+/// ends. Otherwise it is the median over frames near the boundary that see points of both maps.
+/// Without such frames the path of the placed components is interpolated, or extrapolated with its
+/// last velocity.
 /// @param placed  at least one centre.
 /// @param part    in a world and scale of its own, at least one centre; the frames' orientations in
 ///                `sources` are those of `placed`'s world.

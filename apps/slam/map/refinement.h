@@ -39,9 +39,10 @@ BundleOptions WithFixedLens(BundleOptions options);
 /// Bundle adjustment of every component from its known-rotation positions. The component with the
 /// most observations refines the lens, as far as the options let it; the others use that lens.
 /// @param cam_from_world  of every view that the solution has placed.
-/// @param tracks  the input of the known-rotation problem; its outliers are classified anew.
-/// @param segments  pure-rotation segments: where both ends are keyframes of a component they share
-///                  a centre.
+/// @param tracks          the input of the known-rotation problem; its outliers are classified
+///                        anew.
+/// @param segments        pure-rotation segments: where both ends are keyframes of a component they
+///                        share a centre.
 /// @param complete        as RefineBundle takes it.
 RefinedComponents RefineComponents(const RotationMap& cam_from_world,
                                    const KrotSolution& krot,

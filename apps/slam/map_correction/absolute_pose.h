@@ -11,7 +11,7 @@ namespace rotslam {
 /// Pose of one frame from known points without a start: consensus over triples of sightings, then
 /// ResectFrame.
 /// @param sightings  most of them may be wrong; a keypoint may occur with several points.
-/// @param options  of ResectFrame; a pose must reach its number of inliers.
+/// @param options    of ResectFrame; a pose must reach its number of inliers.
 /// @return  nullopt where no pose reaches it.
 /// Error:   as ResectFrame's; eight in ten sightings may be outliers (relocalisation tests).
 /// Cost:    up to 1,000 triples, each tried on all sightings: 50 ms for 300.
