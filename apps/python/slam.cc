@@ -163,6 +163,7 @@ class PyResult {
 
   std::vector<std::vector<int>> Components() const {
     std::vector<std::vector<int>> components;
+    components.reserve(map_.components.size());
     for (const MapComponent& component : map_.components) {
       components.push_back(NumbersOf(component.keyframes));
     }
@@ -171,6 +172,7 @@ class PyResult {
 
   std::vector<std::pair<int, int>> Segments() const {
     std::vector<std::pair<int, int>> segments;
+    segments.reserve(map_.held.size());
     for (const PureRotationSegment& segment : map_.held) {
       segments.emplace_back(segment.first.value, segment.last.value);
     }
@@ -204,6 +206,7 @@ class PyResult {
  private:
   static std::vector<int> NumbersOf(const std::set<FrameId>& frames) {
     std::vector<int> numbers;
+    numbers.reserve(frames.size());
     for (const FrameId frame : frames) numbers.push_back(frame.value);
     return numbers;
   }
