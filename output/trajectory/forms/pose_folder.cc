@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "output/trajectory/trajectory.h"
 #include "output/trajectory/trajectory_form.h"
 
 namespace rotslam {
