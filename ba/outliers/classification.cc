@@ -92,7 +92,6 @@ class Classifier {
         max_error_px_(round.max_error_px),
         max_residual_(round.max_residual),
         loss_(MakeLoss(round)),
-        min_observations_(options.min_observations),
         min_angle_rad_(options.min_angle_deg * kRadFromDeg) {}
 
   // Marks the observations that the track's position, or else a better one downhill from it,
@@ -126,7 +125,7 @@ class Classifier {
       sight.used = fits[k] && !state_.frames[sight.frame].weak;
       count += sight.used ? 1 : 0;
     }
-    const bool enough = count >= min_observations_ && (track.one_place || IsDeep(track));
+    const bool enough = count >= kMinTrackObservations && (track.one_place || IsDeep(track));
     track.kind = !enough           ? TrackKind::kOut
                  : track.one_place ? TrackKind::kDirection
                                    : TrackKind::kPoint;
@@ -310,7 +309,6 @@ class Classifier {
   double max_error_px_;  // zero: whatever projects fits
   double max_residual_;  // zero: as the former, in sigmas
   std::unique_ptr<ceres::LossFunction> loss_;
-  int min_observations_;
   double min_angle_rad_;
 };
 

@@ -44,9 +44,6 @@ std::optional<std::string> BundleOptions::Problem() const {
   if (max_final_rounds < 1) {
     return OutOfRange("max_final_rounds", max_final_rounds, "at least 1");
   }
-  if (min_observations < 2) {
-    return OutOfRange("min_observations", min_observations, "at least 2");
-  }
   if (!(min_angle_deg > 0.0 && min_angle_deg < 90.0)) {
     return OutOfRange("min_angle_deg", min_angle_deg, "above 0 and below 90");
   }

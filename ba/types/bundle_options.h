@@ -5,6 +5,9 @@
 
 namespace rotslam {
 
+/// A track with fewer fitting observations is dropped. Two views always agree along the epipolar
+/// line, so two say nothing about the match; three do.
+inline constexpr int kMinTrackObservations = 3;
 /// A frame with fewer fitting observations is left out of a round: six unknowns on a handful of
 /// points follow any outlier. Twelve give four numbers for each unknown.
 inline constexpr int kMinFrameObservations = 12;
@@ -127,9 +130,6 @@ struct BundleOptions {
   // more on KITTI 00.
   bool find_covariance = false;
 
-  // A track with fewer fitting observations is dropped. Two views always agree along the epipolar
-  // line, so two say nothing about the match; three do.
-  int min_observations = 3;
   // A point needs two rays that meet at this angle, else its depth is noise. Low on purpose: a
   // shallow point holds rotations well: 1 deg instead of 0.2 costs KITTI 00 (first 200 frames) 4 %
   // of its position error, 0.05 deg gains nothing. At a focal length of 700 px, 0.2 deg is 2.4 px

@@ -11,8 +11,8 @@ Reconstruction MakeCloudOf(const CloudSources& sources,
   problem.start.center_in_world = sources.center_in_world;
   problem.start.point_in_world = sources.point_in_world;
   problem.start.tracks = tracks;
-  std::erase_if(problem.start.tracks, [&](const Track& track) {
-    return static_cast<int>(track.observations.size()) < options.min_observations;
+  std::erase_if(problem.start.tracks, [](const Track& track) {
+    return static_cast<int>(track.observations.size()) < kMinTrackObservations;
   });
   for (const PureRotationSegment& segment : sources.segments) {
     for (const auto& [frame, rotation] : sources.cam_from_world) {

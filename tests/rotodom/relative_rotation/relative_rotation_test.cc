@@ -340,7 +340,7 @@ TEST(EstimateRelativeRotation, RepeatedMatchesDoNoHarm) {
 TEST(EstimateRelativeRotation, RejectsABrokenContract) {
   PairScene scene = MakePairScene({});
   RelativeRotationOptions bad;
-  bad.loss_sigmas = -1.0;
+  bad.inlier_px = -1.0;
   EXPECT_THROW(EstimateRelativeRotation(scene.pairs, Rotation(), kPairFocalPx, bad, 1),
                std::invalid_argument);
   scene.pairs[3].bearing_i.x() = std::numeric_limits<double>::quiet_NaN();
