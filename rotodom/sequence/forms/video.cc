@@ -1,4 +1,4 @@
-#include "rotodom/sequence/video.h"
+#include "rotodom/sequence/video/video.h"
 
 #include <algorithm>
 #include <array>

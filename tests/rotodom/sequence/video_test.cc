@@ -15,7 +15,7 @@
 #include <opencv2/videoio.hpp>
 
 #include "rotodom/sequence/sequence.h"
-#include "rotodom/sequence/video_file.h"
+#include "rotodom/sequence/video/video_file.h"
 #include "tests/rotodom/sequence/scratch_folder.h"
 #include "tests/rotodom/sequence/test_video.h"
 

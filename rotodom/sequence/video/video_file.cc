@@ -1,4 +1,4 @@
-#include "rotodom/sequence/video_file.h"
+#include "rotodom/sequence/video/video_file.h"
 
 #include <algorithm>
 #include <array>

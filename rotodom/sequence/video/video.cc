@@ -1,4 +1,4 @@
-#include "rotodom/sequence/video.h"
+#include "rotodom/sequence/video/video.h"
 
 #include <algorithm>
 #include <cstddef>
@@ -9,7 +9,7 @@
 #include <stdexcept>
 #include <utility>
 
-#include "rotodom/sequence/video_file.h"
+#include "rotodom/sequence/video/video_file.h"
 
 namespace rotslam {
 namespace {

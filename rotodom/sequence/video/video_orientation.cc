@@ -1,4 +1,4 @@
-#include "rotodom/sequence/video_orientation.h"
+#include "rotodom/sequence/video/video_orientation.h"
 
 #include <algorithm>
 #include <cmath>

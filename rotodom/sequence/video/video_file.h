@@ -13,7 +13,7 @@
 #include <opencv2/core/mat.hpp>
 
 #include "rotodom/sequence/image_file.h"
-#include "rotodom/sequence/video_orientation.h"
+#include "rotodom/sequence/video/video_orientation.h"
 
 // FFmpeg's.
 struct AVCodecContext;
