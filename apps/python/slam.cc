@@ -172,8 +172,8 @@ class PyResult {
 
   std::vector<std::pair<int, int>> Segments() const {
     std::vector<std::pair<int, int>> segments;
-    segments.reserve(map_.held.size());
-    for (const PureRotationSegment& segment : map_.held) {
+    segments.reserve(map_.segments.size());
+    for (const PureRotationSegment& segment : map_.segments) {
       segments.emplace_back(segment.first.value, segment.last.value);
     }
     return segments;
@@ -183,7 +183,7 @@ class PyResult {
     return map_.failure.empty() ? std::nullopt : std::optional(map_.failure);
   }
   const Camera& camera() const { return map_.camera; }
-  bool is_pure_rotation() const { return map_.is_held_throughout; }
+  bool is_pure_rotation() const { return map_.rotates_throughout; }
   bool interrupted() const { return interrupted_; }
 
   void WriteTrajectory(const py::object& path) const {

@@ -104,7 +104,7 @@ TEST(BuildKeyframeMap, FindsCentresAndPointsUpToSimilarity) {
   StageObserver observer;
   const MapResult result = BuildKeyframeMap(OrientationsOf(scene, false), SlamOptions(), observer);
   EXPECT_EQ(result.failure, "");
-  EXPECT_FALSE(result.is_held_throughout);
+  EXPECT_FALSE(result.rotates_throughout);
   ASSERT_EQ(result.components.size(), 1U);
   EXPECT_FALSE(result.components[0].placed_by_default);
   EXPECT_EQ(result.bundles.size(), 1U);
@@ -157,13 +157,13 @@ Scene Pivot() {
 }
 
 void ExpectNoMapOfAPureRotation(const MapResult& result) {
-  EXPECT_TRUE(result.is_held_throughout);
+  EXPECT_TRUE(result.rotates_throughout);
   EXPECT_EQ(result.failure, "");
   EXPECT_TRUE(result.components.empty());
   EXPECT_TRUE(result.map.point_in_world.empty());
-  ASSERT_EQ(result.held.size(), 1U);
-  EXPECT_EQ(result.held[0].first, FrameId{0});
-  EXPECT_EQ(result.held[0].last, FrameId{15});
+  ASSERT_EQ(result.segments.size(), 1U);
+  EXPECT_EQ(result.segments[0].first, FrameId{0});
+  EXPECT_EQ(result.segments[0].last, FrameId{15});
   ASSERT_EQ(result.center_in_world.size(), 16U);
   for (const auto& [frame, center] : result.center_in_world) EXPECT_TRUE(center.isZero(0.0));
 }
@@ -194,7 +194,7 @@ TEST(BuildKeyframeMap, SaysWhyThereIsNoMap) {
   orientations.edge_matches.clear();
   const MapResult result = BuildFrom(orientations);
   EXPECT_NE(result.failure, "");
-  EXPECT_FALSE(result.is_held_throughout);
+  EXPECT_FALSE(result.rotates_throughout);
   EXPECT_EQ(result.center_in_world.size(), 24U);
 }
 
