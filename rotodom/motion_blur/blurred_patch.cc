@@ -77,10 +77,10 @@ std::vector<float> CopyWindow(const cv::Mat& image,
 }
 
 // The mean of the image along the blur vector, for each pixel within `half_side` of the centre.
-BlurredWindow BlurAround(const cv::Mat& image,
-                         const Eigen::Vector2d& center_px,
-                         const Eigen::Vector2d& blur_px,
-                         int half_side) {
+BlurredWindow BlurredWindowAround(const cv::Mat& image,
+                                  const Eigen::Vector2d& center_px,
+                                  const Eigen::Vector2d& blur_px,
+                                  int half_side) {
   const int side = 2 * half_side + 1;
   const int stride = RoundedUp(side);
   const Eigen::Vector2i margin = (0.5 * blur_px.cwiseAbs()).array().ceil().cast<int>() + 1;
@@ -133,14 +133,14 @@ std::optional<PatchAlignment> AlignBlurredPatch(const BlurredPatch& patch,
   const double longest_px = std::max(blur_in_view.norm(), blur_in_target.norm());
   if (!(longest_px <= kLongestBlurPx && stretch <= kMostStretch)) return std::nullopt;
   const BlurredWindow from =
-      BlurAround(patch.image,
-                 patch.center_px,
-                 blur_in_view,
-                 static_cast<int>(std::ceil(std::max(1.0, stretch) * kReach)));
+      BlurredWindowAround(patch.image,
+                          patch.center_px,
+                          blur_in_view,
+                          static_cast<int>(std::ceil(std::max(1.0, stretch) * kReach)));
   const auto sampled =
       PatchTemplate::Sample(from.pixels, patch.center_px - from.origin_px, patch.target_from_view);
   if (!sampled) return std::nullopt;
-  const BlurredWindow in = BlurAround(
+  const BlurredWindow in = BlurredWindowAround(
       target, start_px, blur_in_target, kReach + static_cast<int>(std::ceil(max_step_px)));
   auto found = AlignPatch(*sampled, in.pixels, start_px - in.origin_px, max_step_px);
   if (found) found->center_px += in.origin_px;

@@ -39,7 +39,7 @@ Eigen::Matrix2d TangentCovariance(const Eigen::Vector3d& bearing,
 
 /// Covariance of the difference of R f_i and f_j, bearings of one point in two images: for
 /// MatchNoise::covariance_j, with variance_i = 0.
-/// @return  image_covariance_i, image_covariance_j covariances of its two image positions.
+/// @param image_covariance_i, image_covariance_j  covariances of its two image positions.
 Eigen::Matrix2d DifferenceCovariance(const Eigen::Vector3d& bearing_i,
                                      const Eigen::Matrix2d& image_covariance_i,
                                      const Eigen::Vector3d& bearing_j,
