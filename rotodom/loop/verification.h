@@ -33,6 +33,7 @@ struct VerificationOptions {
   // an edge from another place does; else there is no edge, and the matches are
   // all that a loop brings. Zero asks once. TUM fr1_rpy, three seeds: 56, 45, 53 edges, 8, 5, 7 of
   // them more than 2 deg off, with zero; 21, 21, 26, the farthest 1.3, 1.6, 1.7 deg off, with 4 ms.
+  // Twice BundleOptions::blur_s_per_px, which fits residuals best: a check has to allow for more.
   double blur_s_per_px = 0.004;
   // With a rolling shutter the rows of a moving camera see the scene from different places. From
   // frame to frame that is much the same; to an edge between two visits it adds this, on each axis.

@@ -39,6 +39,8 @@ TEST_F(BatchList, NamesLineAndReason) {
               AllOf(HasSubstr("list.yaml:2: "), HasSubstr("the nearest one is \"camera\"")));
   EXPECT_THAT(Refusal("- path: a\n  options: {krot: {strat: l1}}\n"),
               HasSubstr("the nearest one is \"options.krot.start\""));
+  EXPECT_THAT(Refusal("- path: a\n  options: {krot: {loose_factor: 3}}\n"),
+              HasSubstr("\"options.krot.loose_factor\" is fixed now"));
   EXPECT_THAT(Refusal("- path: a\n  options: {krot: {threshold_px: -1}}\n"),
               HasSubstr("krot.threshold_px is -1"));
   EXPECT_THAT(Refusal("- path: a\n  command: solve\n"), HasSubstr("must be run or rotations"));
