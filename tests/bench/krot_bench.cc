@@ -14,6 +14,8 @@
 #include <unistd.h>
 
 #include "krot/bracket/bisection.h"
+#include "krot/lp/lp.h"
+#include "krot/structure/minimax_lp.h"
 #include "tests/krot/problem_from_scene.h"
 
 namespace rotslam {

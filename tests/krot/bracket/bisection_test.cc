@@ -6,6 +6,7 @@
 
 #include <gtest/gtest.h>
 
+#include "krot/lp/lp.h"
 #include "tests/krot/problem_from_scene.h"
 
 namespace rotslam {
