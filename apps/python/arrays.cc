@@ -52,6 +52,30 @@ std::vector<int> Indices(const char* name, const py::object& object) {
   return indices;
 }
 
+cv::Mat ImageFrom(const char* name, const py::object& object, const cv::Size& size) {
+  if (object.is_none()) return {};
+  constexpr const char* kExpected = "a uint8 array [height, width] or [height, width, 3] (BGR)";
+  const py::array image = py::array::ensure(object);
+  if (!image) throw std::invalid_argument(std::string(name) + " must be " + kExpected);
+  const bool is_grey = image.ndim() == 2;
+  const bool is_bgr = image.ndim() == 3 && image.shape(2) == 3;
+  if (!(is_grey || is_bgr) || image.dtype().kind() != 'u' || image.itemsize() != 1) {
+    RefuseArray(name, kExpected, image);
+  }
+  if (image.shape(0) != size.height || image.shape(1) != size.width) {
+    throw std::invalid_argument(std::string(name) + " must have the camera's size [" +
+                                std::to_string(size.height) + ", " + std::to_string(size.width) +
+                                "], found " + ShapeOf(image));
+  }
+  const auto packed = py::array_t<std::uint8_t, py::array::c_style>::ensure(image);
+  // The caller may write into the array as soon as the call is over; older images stay in use.
+  return cv::Mat(size.height,
+                 size.width,
+                 is_grey ? CV_8UC1 : CV_8UC3,
+                 const_cast<std::uint8_t*>(packed.data()))
+      .clone();
+}
+
 std::string PathOf(const py::object& path) {
   return py::str(py::module_::import("os").attr("fspath")(path));
 }

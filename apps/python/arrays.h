@@ -4,6 +4,7 @@
 #include <vector>
 
 #include <Eigen/Core>
+#include <opencv2/core.hpp>
 #include <pybind11/numpy.h>
 
 #include "rotodom/types/rotation.h"
@@ -28,6 +29,9 @@ DoubleArray Numbers(const char* name,
 
 /// A one-dimensional array of integers from 0.
 std::vector<int> Indices(const char* name, const pybind11::object& object);
+
+/// An image as uint8 array, copied; empty for None.
+cv::Mat ImageFrom(const char* name, const pybind11::object& object, const cv::Size& size);
 
 /// Of a str or a path object.
 std::string PathOf(const pybind11::object& path);

@@ -6,8 +6,9 @@
 
 PYBIND11_MODULE(rotslam, module) {
   module.doc() =
-      "Known-rotation monocular SLAM: orientations frame by frame, positions from known rotations, "
-      "evaluation.";
+      "Known-rotation monocular SLAM: the whole system, orientations frame by frame, positions "
+      "from "
+      "known rotations, evaluation.";
   module.attr("__version__") = rotslam::Version();
   // Our stages bring their own threads.
   cv::setNumThreads(1);
@@ -15,5 +16,6 @@ PYBIND11_MODULE(rotslam, module) {
   rotslam::AddSequence(module);
   rotslam::AddOdometry(module);
   rotslam::AddKnownRotation(module);
+  rotslam::AddSlam(module);
   rotslam::AddEvaluation(module);
 }

@@ -11,6 +11,7 @@ void AddCamera(pybind11::module_& module);
 void AddSequence(pybind11::module_& module);
 void AddOdometry(pybind11::module_& module);
 void AddKnownRotation(pybind11::module_& module);
+void AddSlam(pybind11::module_& module);
 void AddEvaluation(pybind11::module_& module);
 
 }  // namespace rotslam

@@ -20,30 +20,6 @@ using namespace py::literals;  // NOLINT(google-build-using-namespace): "name"_a
 namespace rotslam {
 namespace {
 
-cv::Mat ImageOf(const py::object& object, const Camera& camera) {
-  if (object.is_none()) return {};
-  constexpr const char* kExpected = "a uint8 array [height, width] or [height, width, 3] (BGR)";
-  const py::array image = py::array::ensure(object);
-  if (!image) throw std::invalid_argument(std::string("image must be ") + kExpected);
-  const bool is_grey = image.ndim() == 2;
-  const bool is_bgr = image.ndim() == 3 && image.shape(2) == 3;
-  if (!(is_grey || is_bgr) || image.dtype().kind() != 'u' || image.itemsize() != 1) {
-    RefuseArray("image", kExpected, image);
-  }
-  if (image.shape(0) != camera.height || image.shape(1) != camera.width) {
-    throw std::invalid_argument("image must have the camera's size [" +
-                                std::to_string(camera.height) + ", " +
-                                std::to_string(camera.width) + "], found " + ShapeOf(image));
-  }
-  const auto packed = py::array_t<std::uint8_t, py::array::c_style>::ensure(image);
-  // The caller may write into the array as soon as the call is over; older images stay in use.
-  return cv::Mat(camera.height,
-                 camera.width,
-                 is_grey ? CV_8UC1 : CV_8UC3,
-                 const_cast<std::uint8_t*>(packed.data()))
-      .clone();
-}
-
 class PyOdometry {
  public:
   PyOdometry(const Camera& camera, const py::object& options, std::uint64_t seed, int threads)
@@ -56,7 +32,7 @@ class PyOdometry {
   }
 
   py::object Add(const py::object& image, double timestamp_s) {
-    const cv::Mat grey = ImageOf(image, camera_);
+    const cv::Mat grey = ImageFrom("image", image, {camera_.width, camera_.height});
     FrameEstimate estimate;
     {
       const py::gil_scoped_release unlocked;

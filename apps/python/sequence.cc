@@ -1,7 +1,6 @@
-#include "rotodom/sequence/sequence.h"
+#include "apps/python/sequence.h"
 
 #include <cstdint>
-#include <memory>
 #include <mutex>
 #include <optional>
 #include <stdexcept>
@@ -31,54 +30,47 @@ py::object ArrayOfImage(const cv::Mat& image) {
   return array;
 }
 
-class PySequence {
- public:
-  PySequence(const py::object& path, int first, int last, int stride, double fps) {
-    SequenceOptions options;
-    options.first = first;
-    options.last = last;
-    options.stride = stride;
-    options.fps = fps;
-    if (const auto problem = options.Problem()) throw std::invalid_argument(*problem);
-    sequence_ = OpenSequence(PathOf(path), options);
-  }
-
-  py::tuple Next() {
-    std::optional<Frame> frame;
-    {
-      const py::gil_scoped_release unlocked;
-      const std::lock_guard lock(mutex_);
-      frame = sequence_->Next();
-    }
-    if (!frame) throw py::stop_iteration();
-    return py::make_tuple(ArrayOfImage(frame->image), frame->timestamp_s);
-  }
-
-  int NumFrames() const { return sequence_->NumFrames(); }
-
-  std::optional<Camera> OwnCamera() const {
-    const auto& reference = sequence_->camera_reference();
-    const cv::Size size = sequence_->image_size();
-    if (reference) {
-      return MatchToImages(
-          ReadCamera(*reference, sequence_->image_folder(), {size.width, size.height}), size);
-    }
-    const auto& camera = sequence_->own_camera();
-    return camera ? std::optional(MatchToImages(*camera, size)) : std::nullopt;
-  }
-
-  std::optional<std::string> GroundTruth() const {
-    const auto& file = sequence_->GroundTruthFile();
-    if (!file) return std::nullopt;
-    return file->string();
-  }
-
- private:
-  std::mutex mutex_;
-  std::unique_ptr<Sequence> sequence_;
-};
-
 }  // namespace
+
+std::optional<Camera> CameraOf(const Sequence& sequence) {
+  const auto& reference = sequence.camera_reference();
+  const cv::Size size = sequence.image_size();
+  if (reference) {
+    return MatchToImages(ReadCamera(*reference, sequence.image_folder(), {size.width, size.height}),
+                         size);
+  }
+  const auto& camera = sequence.own_camera();
+  return camera ? std::optional(MatchToImages(*camera, size)) : std::nullopt;
+}
+
+PySequence::PySequence(const py::object& path, int first, int last, int stride, double fps)
+    : path_(PathOf(path)) {
+  options_.first = first;
+  options_.last = last;
+  options_.stride = stride;
+  options_.fps = fps;
+  if (const auto problem = options_.Problem()) throw std::invalid_argument(*problem);
+  sequence_ = OpenSequence(path_, options_);
+}
+
+py::tuple PySequence::Next() {
+  std::optional<Frame> frame;
+  {
+    const py::gil_scoped_release unlocked;
+    const std::lock_guard lock(mutex_);
+    frame = sequence_->Next();
+  }
+  if (!frame) throw py::stop_iteration();
+  return py::make_tuple(ArrayOfImage(frame->image), frame->timestamp_s);
+}
+
+std::optional<Camera> PySequence::OwnCamera() const { return CameraOf(*sequence_); }
+
+std::optional<std::string> PySequence::GroundTruth() const {
+  const auto& file = sequence_->GroundTruthFile();
+  if (!file) return std::nullopt;
+  return file->string();
+}
 
 void AddSequence(py::module_& module) {
   py::class_<PySequence>(module, "Sequence", R"(The frames of a sequence, each once.

@@ -29,17 +29,32 @@ if(python)
     ${python} -c "import rotslam; assert rotslam.__version__ == '${version}', rotslam.__version__")
 endif()
 
-# The streaming example, on a few rendered images: eight numbers for each.
-run(${CMAKE_COMMAND} -S ${example_dir} -B ${work_dir}/streaming -G ${generator}
-  -D CMAKE_PREFIX_PATH=${work_dir}/prefix -D CMAKE_CXX_COMPILER=${compiler} -D CMAKE_CXX_FLAGS=${flags})
-run(${CMAKE_COMMAND} --build ${work_dir}/streaming)
-run(${work_dir}/prefix/bin/rotslam simulate handheld --frames 6 --width 320 --height 240 --quiet
+# The examples, on a small rendered sequence.
+foreach(example streaming run)
+  run(${CMAKE_COMMAND} -S ${examples_dir}/${example} -B ${work_dir}/${example} -G ${generator}
+    -D CMAKE_PREFIX_PATH=${work_dir}/prefix -D CMAKE_CXX_COMPILER=${compiler} -D CMAKE_CXX_FLAGS=${flags})
+  run(${CMAKE_COMMAND} --build ${work_dir}/${example})
+endforeach()
+run(${work_dir}/prefix/bin/rotslam simulate handheld --frames 24 --width 320 --height 240 --quiet
   --out ${work_dir}/sequence)
+
+# Eight numbers for each frame.
 execute_process(
   COMMAND ${work_dir}/streaming/streaming ${work_dir}/sequence ${work_dir}/sequence/camera.yaml
   OUTPUT_VARIABLE lines RESULT_VARIABLE result)
 string(REGEX MATCHALL "\n[0-9.]+ -?[0-9.]+ -?[0-9.]+ -?[0-9.]+ -?[0-9.]+ [0-9.]+ [0-9.]+ [0-9.]+" frames "${lines}")
 list(LENGTH frames num_frames)
-if(NOT result EQUAL 0 OR NOT num_frames EQUAL 6)
+if(NOT result EQUAL 0 OR NOT num_frames EQUAL 24)
   message(FATAL_ERROR "the streaming example (${result}) printed:\n${lines}")
 endif()
+
+# A pose of each frame and a cloud.
+run(${work_dir}/run/run ${work_dir}/sequence ${work_dir}/sequence/camera.yaml ${work_dir}/cloud.ply
+  ${work_dir}/map_trajectory.txt)
+file(STRINGS ${work_dir}/map_trajectory.txt poses REGEX "^[0-9]")
+list(LENGTH poses num_poses)
+file(STRINGS ${work_dir}/cloud.ply num_points REGEX "^element vertex [1-9][0-9][0-9]")
+if(NOT num_poses EQUAL 24 OR NOT num_points)
+  message(FATAL_ERROR "the run example has written ${num_poses} poses and \"${num_points}\"")
+endif()
+run(${work_dir}/prefix/bin/rotslam eval --json ${work_dir}/sequence/groundtruth_tum.txt ${work_dir}/map_trajectory.txt)

@@ -1,6 +1,7 @@
 #include <cstdio>
 #include <string>
 
+#include "apps/slam/build_map.h"
 #include "ba/bundle_adjustment.h"
 #include "krot/known_rotation.h"
 #include "output/map/ply.h"
@@ -21,6 +22,7 @@ int main(int, char** argv) {
   Need("OpenSequence", &rotslam::OpenSequence);
   Need("SolveKnownRotation", &rotslam::SolveKnownRotation);
   Need("RefineBundle", &rotslam::RefineBundle);
+  Need("BuildMap", &rotslam::BuildMap);
 
   rotslam::Trajectory trajectory;
   for (int k = 0; k < 4; ++k) {
