@@ -15,7 +15,7 @@ struct RotatingView {
   Eigen::Vector3d rate;  // rad/s, in camera axes
 };
 
-/// Finds how long images are exposed from how a turning camera blurs them.
+/// Estimates the exposure time of images by the motion blur of a rotating camera.
 ///
 /// Of two views that turn at different rates one is blurred farther. With the right time of
 /// exposure AlignBlurredPatch makes their patches alike; how unlike they stay is found for a few

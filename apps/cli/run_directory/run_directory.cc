@@ -116,7 +116,7 @@ int ComponentAt(const std::vector<MapComponent>& components, int frame) {
   return found;
 }
 
-// What a frame belongs to: its segment, or -1, and the way it moves there.
+// The pure-rotation segment that holds a frame (-1: none), and how the camera moves at the frame.
 struct FrameMotion {
   int stretch = -1;
   const char* kind = "translating";

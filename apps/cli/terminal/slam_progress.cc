@@ -12,7 +12,7 @@
 
 namespace rotslam {
 
-// What runs past while the sequence is read.
+// Counts inliers, loops and segments for the line of progress.
 class SlamProgress::Counters {
  public:
   explicit Counters(const PureRotationOptions& options) : options_(options) {}
@@ -79,7 +79,7 @@ const char* NameOf(SlamStage stage) {
   return "";
 }
 
-// What a copy has cut off is missed by nobody; the odd frame is a container's own miscount.
+// Warns of a video that was cut off. Containers often announce one or two frames too many.
 void WarnOfMissingFrames(int num_frames, int num_announced, Progress& progress) {
   const int num_missing = num_announced - num_frames;
   if (num_missing <= std::max(2, num_announced / 100)) return;
