@@ -6,10 +6,8 @@
 
 namespace rotslam {
 
-SequenceSource::SequenceSource(std::filesystem::path path, SequenceOptions options)
-    : path_(std::move(path)),
-      options_(std::move(options)),
-      sequence_(OpenSequence(path_, options_)) {}
+SequenceSource::SequenceSource(std::filesystem::path path, const SequenceOptions& options)
+    : path_(std::move(path)), options_(options), sequence_(OpenSequence(path_, options_)) {}
 
 void SequenceSource::Read(const std::set<FrameId>& frames,
                           const std::function<void(FrameId, const cv::Mat&)>& take,

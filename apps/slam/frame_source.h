@@ -45,7 +45,7 @@ class FrameSource : public ImageProvider {
 class SequenceSource : public FrameSource {
  public:
   /// Throws as OpenSequence does.
-  SequenceSource(std::filesystem::path path, SequenceOptions options);
+  SequenceSource(std::filesystem::path path, const SequenceOptions& options);
 
   const Sequence& sequence() const { return *sequence_; }
   const std::filesystem::path& path() const { return path_; }

@@ -23,12 +23,12 @@ struct FocalGuess {
 /// nullopt where it does not say.
 std::optional<double> FilmFocalLength(const std::filesystem::path& image);
 
-/// What the first image's EXIF data say, else GuessFocalLength.
+/// The focal length by the first image's EXIF data. Without these it is GuessFocalLength.
 FocalGuess GuessFocal(const std::filesystem::path& sequence,
                       const SequenceOptions& options,
                       const cv::Size& image_size);
 
-/// What to tell the user, and the part of summary.json.
+/// The warning to the user, and the entries of summary.json.
 std::string WarningOf(const FocalGuess& guess, const Camera& refined);
 SummaryTable SummaryOf(const FocalGuess& guess, const Camera& refined);
 

@@ -37,7 +37,7 @@ struct InputFlags {
 
 void AddInputFlags(CLI::App& command, InputFlags& flags);
 
-/// What a run works on.
+/// A sequence with its camera, opened for a run.
 struct Input {
   std::string path;  // of the sequence, absolute
   std::unique_ptr<SequenceSource> frames;

@@ -23,7 +23,7 @@ struct RunOptions : SlamOptions {
   }
 };
 
-/// What `run` and `solve` take about the known-rotation solver.
+/// The flags of `run` and `solve` for the known-rotation solver.
 struct KrotFlags {
   std::string start;  // empty: as the configuration says
   bool no_certificate = false;

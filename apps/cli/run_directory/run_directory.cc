@@ -116,7 +116,7 @@ int ComponentAt(const std::vector<MapComponent>& components, int frame) {
   return found;
 }
 
-// The pure-rotation segment that a frame belongs to, -1 for none, and how the camera moves there.
+// The pure-rotation segment that holds a frame (-1: none), and how the camera moves at the frame.
 struct FrameMotion {
   int pure_rotation = -1;
   const char* kind = "translating";

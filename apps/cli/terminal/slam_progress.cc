@@ -13,7 +13,7 @@
 
 namespace rotslam {
 
-// Counts that are shown while the sequence is read.
+// Counts inliers, loops and segments for the line of progress.
 class SlamProgress::Counters {
  public:
   explicit Counters(const PureRotationOptions& options) : options_(options) {}
@@ -101,8 +101,7 @@ std::string FrameRanges(const std::set<FrameId>& frames) {
   return text + (num_more > 0 ? " and " + std::to_string(num_more) + " more" : std::string());
 }
 
-// A video that was cut off while it was copied still announces all of its frames. Containers
-// miscount by a frame or two, which needs no warning.
+// Warns of a video that was cut off. Containers often announce one or two frames too many.
 void WarnOfMissingFrames(int num_frames, int num_announced, Progress& progress) {
   const int num_missing = num_announced - num_frames;
   if (num_missing <= std::max(2, num_announced / 100)) return;

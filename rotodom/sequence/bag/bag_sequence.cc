@@ -85,11 +85,14 @@ class TopicChoice {
   std::size_t Named(std::string name) {
     if (!name.starts_with('/')) name = '/' + name;
     const std::vector<BagTopic>& topics = reader_.topics();
-    for (std::size_t k = 0; k < topics.size(); ++k) {
-      if (topics[k].name != name && '/' + topics[k].name != name) continue;
-      const std::string why = IsImageTopic(topics[k])
+    const auto found = std::find_if(topics.begin(), topics.end(), [&](const BagTopic& topic) {
+      return topic.name == name || '/' + topic.name == name;
+    });
+    if (found != topics.end()) {
+      const auto k = static_cast<std::size_t>(found - topics.begin());
+      const std::string why = IsImageTopic(*found)
                                   ? WhyNot(k)
-                                  : "has " + topics[k].type + ", not images" + OfImageTopics();
+                                  : "has " + found->type + ", not images" + OfImageTopics();
       if (why.empty()) return k;
       Fail(place_, "topic " + name + " " + why);
     }
