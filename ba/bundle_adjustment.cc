@@ -12,6 +12,7 @@
 #include "ba/outliers/classification.h"
 #include "ba/problem/bundle_state.h"
 #include "ba/solver/minimisation.h"
+#include "rotodom/types/splitmix64.h"
 #include "rotodom/types/stopwatch.h"
 #include "rotodom/types/triangulation.h"
 
@@ -30,20 +31,12 @@ bool AllFinite(const BundleState& state) {
   });
 }
 
-// Numbers in no order, the same everywhere (splitmix64).
-std::uint64_t Scramble(std::uint64_t value) {
-  std::uint64_t z = value + 0x9E3779B97F4A7C15ull;
-  z = (z ^ (z >> 30)) * 0xBF58476D1CE4E5B9ull;
-  z = (z ^ (z >> 27)) * 0x94D049BB133111EBull;
-  return z ^ (z >> 31);
-}
-
 // The state with tracks drawn at random until every frame has `num_wanted` observations.
 BundleState WithSomeTracks(const BundleState& state, int num_wanted) {
   std::vector<std::size_t> order(state.tracks.size());
   std::iota(order.begin(), order.end(), std::size_t{0});
   std::sort(order.begin(), order.end(), [](std::size_t a, std::size_t b) {
-    return Scramble(a) < Scramble(b);
+    return HashOf(a) < HashOf(b);
   });
   std::vector<int> count(state.frames.size(), 0);
   std::vector<bool> taken(state.tracks.size(), false);

@@ -49,9 +49,10 @@ std::optional<ComponentStart> SolveSelected(const RotationMap& cam_from_world,
 std::vector<Track> TracksOf(const std::set<FrameId>& views,
                             const std::vector<Track>& tracks,
                             double min_z) {
-  return RestrictTracks(tracks, [&](const Observation& observation) {
+  const auto is_in_front = [&](const Observation& observation) {
     return views.contains(observation.frame) && observation.bearing.z() >= min_z;
-  });
+  };
+  return RestrictTracks(tracks, is_in_front, 2);
 }
 
 // The views, in the order of time, cut into pieces that overlap by a quarter.
@@ -155,8 +156,7 @@ std::optional<ComponentStart> StartComponent(const RotationMap& cam_from_world,
   growth.resection.seed = options.seed;
   growth.min_angle_rad = units.lp_parallax_rad;
   growth.threshold_rad = units.loose_rad;
-  const auto member_tracks = RestrictTracks(
-      tracks, [&](const Observation& observation) { return members.contains(observation.frame); });
+  const auto member_tracks = RestrictTracks(tracks, members, 2);
   const std::size_t before = start->centers.size();
   RegisterViews(cam_from_world, member_tracks, component.views, growth, start->centers);
   start->num_grown_views = static_cast<int>(start->centers.size() - before);

@@ -13,7 +13,6 @@
 #include "krot/bracket/bisection.h"
 #include "krot/component_start.h"
 #include "krot/initialisation/epipolar_filter.h"
-#include "krot/initialisation/selection.h"
 #include "krot/named_problem.h"
 #include "krot/structure/components.h"
 #include "krot/structure/minimax_problem.h"
@@ -263,8 +262,7 @@ std::vector<ViewComponent> LeftBehind(const RotationMap& cam_from_world,
     if (!solution.center_in_world.contains(view)) left.insert(view);
   }
   if (left.size() < kMinViews) return {};
-  const auto their_tracks = RestrictTracks(
-      tracks, [&](const Observation& observation) { return left.contains(observation.frame); });
+  const auto their_tracks = RestrictTracks(tracks, left, 2);
   std::vector<ViewComponent> parts = FindComponents(cam_from_world, their_tracks, options);
   std::erase_if(parts, [](const ViewComponent& part) { return part.views.size() < kMinViews; });
   return parts;

@@ -7,8 +7,8 @@
 
 #include <Eigen/Dense>
 
-#include "rotodom/types/draw.h"
 #include "rotodom/types/median.h"
+#include "rotodom/types/splitmix64.h"
 
 namespace rotslam {
 namespace {
@@ -58,13 +58,13 @@ int CountInliers(const std::vector<SharedTrack>& shared,
 Eigen::Vector3d VoteDirection(const std::vector<SharedTrack>& shared,
                               const EpipolarFilterOptions& options,
                               std::uint64_t seed) {
-  Draw draw(seed);
+  SplitMix64 random(seed);
   const int count = static_cast<int>(shared.size());
   Eigen::Vector3d best = Eigen::Vector3d::UnitZ();
   int most = -1;
   for (int sample = 0; sample < options.max_samples; ++sample) {
-    const SharedTrack& a = shared[draw.Index(count)];
-    const SharedTrack& b = shared[draw.Index(count)];
+    const SharedTrack& a = shared[random.Index(count)];
+    const SharedTrack& b = shared[random.Index(count)];
     const Eigen::Vector3d direction = a.normal.cross(b.normal);
     if (!(direction.norm() > 1e-12)) continue;
     const int inliers = CountInliers(shared, direction.normalized(), options.threshold_rad);

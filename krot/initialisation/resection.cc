@@ -5,7 +5,7 @@
 
 #include <Eigen/Dense>
 
-#include "rotodom/types/draw.h"
+#include "rotodom/types/splitmix64.h"
 #include "rotodom/types/triangulation.h"
 
 namespace rotslam {
@@ -69,13 +69,13 @@ std::optional<Resection> ResectCenter(const std::vector<RayToPoint>& rays,
                                       const CenterResectionOptions& options) {
   const int count = static_cast<int>(rays.size());
   if (count < 3) return std::nullopt;
-  Draw draw(options.seed);
+  SplitMix64 random(options.seed);
   std::vector<int> best;
   Eigen::Vector3d best_center = Eigen::Vector3d::Zero();
   int needed = options.max_samples;
   for (int sample = 0; sample < needed; ++sample) {
-    const int a = draw.Index(count);
-    const int b = draw.Index(count);
+    const int a = random.Index(count);
+    const int b = random.Index(count);
     if (a == b) continue;
     const auto center = Midpoint(rays[a], rays[b]);
     if (!center) continue;

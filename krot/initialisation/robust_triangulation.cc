@@ -1,6 +1,6 @@
 #include "krot/initialisation/robust_triangulation.h"
 
-#include "rotodom/types/draw.h"
+#include "rotodom/types/splitmix64.h"
 
 namespace rotslam {
 namespace {
@@ -50,10 +50,10 @@ std::optional<RobustPoint> TriangulateRobustly(const std::vector<Sighting>& sigh
       for (int b = a + 1; b < count; ++b) propose(a, b);
     }
   } else {
-    Draw draw(static_cast<std::uint64_t>(count));
+    SplitMix64 random(static_cast<std::uint64_t>(count));
     for (int trial = 0; trial < 15; ++trial) {
-      const int a = draw.Index(count);
-      const int b = draw.Index(count);
+      const int a = random.Index(count);
+      const int b = random.Index(count);
       if (a != b) propose(a, b);
     }
   }

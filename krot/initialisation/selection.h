@@ -1,6 +1,5 @@
 #pragma once
 
-#include <utility>
 #include <vector>
 
 #include "rotodom/types/maps.h"
@@ -26,20 +25,5 @@ struct SelectionOptions {
 std::vector<int> SelectTracks(const RotationMap& cam_from_world,
                               const std::vector<Track>& tracks,
                               const SelectionOptions& options);
-
-/// Restricts tracks to the observations that fulfil `keep`; tracks with fewer than two are dropped.
-template <class Keep>
-std::vector<Track> RestrictTracks(const std::vector<Track>& tracks, const Keep& keep) {
-  std::vector<Track> result;
-  for (const Track& track : tracks) {
-    Track part;
-    part.id = track.id;
-    for (const Observation& observation : track.observations) {
-      if (keep(observation)) part.observations.push_back(observation);
-    }
-    if (part.observations.size() >= 2) result.push_back(std::move(part));
-  }
-  return result;
-}
 
 }  // namespace rotslam

@@ -10,8 +10,8 @@
 #include <Eigen/Cholesky>
 
 #include "rotodom/types/disjoint_sets.h"
-#include "rotodom/types/draw.h"
 #include "rotodom/types/median.h"
+#include "rotodom/types/splitmix64.h"
 
 namespace rotslam {
 namespace {
@@ -67,12 +67,12 @@ void TakeShared(const std::map<Key, Eigen::Vector3d>& a,
 
 // Scale of b relative to a (natural logarithm) from the distances between shared views and points.
 std::optional<Tie> ScaleTie(int a, int b, const std::vector<Shared>& shared) {
-  Draw draw(1);
+  SplitMix64 random(1);
   const int count = static_cast<int>(shared.size());
   std::vector<std::pair<double, double>> lengths;
   for (int k = 0; k < kNumDistances; ++k) {
-    const Shared& one = shared[draw.Index(count)];
-    const Shared& other = shared[draw.Index(count)];
+    const Shared& one = shared[random.Index(count)];
+    const Shared& other = shared[random.Index(count)];
     const double in_a = (one.in_a - other.in_a).norm();
     const double in_b = (one.in_b - other.in_b).norm();
     if (in_a > 0.0 && in_b > 0.0) lengths.emplace_back(in_a * in_b, std::log(in_b / in_a));

@@ -7,6 +7,8 @@
 #include <queue>
 #include <tuple>
 
+#include "rotodom/types/splitmix64.h"
+
 namespace rotslam {
 namespace {
 
@@ -18,11 +20,9 @@ constexpr double kContradictedClass = 3.0;
 using Candidate = std::tuple<double, double, int, int>;  // class, variance, view, edge
 
 // A pseudo-random number from 0 to 1.
-double Hash(std::uint64_t seed, std::uint64_t trial, std::uint64_t edge) {
-  std::uint64_t z = ((seed * 0x2545f4914f6cdd1dU + trial) << 32) + edge + 0x9e3779b97f4a7c15U;
-  z = (z ^ (z >> 30)) * 0xbf58476d1ce4e5b9U;
-  z = (z ^ (z >> 27)) * 0x94d049bb133111ebU;
-  return static_cast<double>((z ^ (z >> 31)) >> 11) * 0x1p-53;
+double UnitHash(std::uint64_t seed, std::uint64_t trial, std::uint64_t edge) {
+  const std::uint64_t bits = HashOf(((seed * 0x2545f4914f6cdd1dU + trial) << 32) + edge);
+  return static_cast<double>(bits >> 11) * 0x1p-53;
 }
 
 }  // namespace
@@ -54,7 +54,7 @@ ConsensusTree::ConsensusTree(const ConsensusGraph& graph,
       if (verdict != EdgeVerdict::kConfirmed) {
         if (is_entered[knowledge.piece[n.view]] != 0) continue;
         extra = verdict == EdgeVerdict::kUnknown ? kUnconfirmedClass : kContradictedClass;
-        if (trial > 0) extra *= 0.5 + Hash(graph.problem().seed, trial, n.edge);
+        if (trial > 0) extra *= 0.5 + UnitHash(graph.problem().seed, trial, n.edge);
       }
       queue.emplace(path_class + extra, variance + graph.edge(n.edge).variance, n.view, n.edge);
     }

@@ -11,29 +11,10 @@
 
 #include "rotodom/types/options.h"
 #include "rotodom/types/parallel.h"
+#include "rotodom/types/splitmix64.h"
 
 namespace rotslam {
 namespace {
-
-// Random numbers that are equal on all platforms, unlike the standard library's distributions.
-// Source: Steele, Lea & Flood, Fast Splittable Pseudorandom Number Generators, OOPSLA 2014.
-class RandomNumbers {
- public:
-  explicit RandomNumbers(std::uint64_t seed) : state_(seed) {}
-
-  std::uint64_t Next() {
-    state_ += 0x9E3779B97F4A7C15U;
-    std::uint64_t z = state_;
-    z = (z ^ (z >> 30)) * 0xBF58476D1CE4E5B9U;
-    z = (z ^ (z >> 27)) * 0x94D049BB133111EBU;
-    return z ^ (z >> 31);
-  }
-  // 0 to limit - 1; the bias is below limit / 2^64.
-  std::uint64_t Below(std::uint64_t limit) { return Next() % limit; }
-
- private:
-  std::uint64_t state_;
-};
 
 // Counts the ones of each of the 256 bits over many descriptors.
 class BitCounter {
@@ -117,7 +98,7 @@ class Divider {
   const BinaryDescriptor& Member(std::size_t k) const { return descriptors_[members_[k]]; }
 
   void ChooseCenters(std::uint64_t seed) {
-    RandomNumbers random(seed);
+    SplitMix64 random(seed);
     std::vector<int> distances(members_.size(), std::numeric_limits<int>::max());
     centers_.push_back(Member(random.Below(members_.size())));
     while (static_cast<int>(centers_.size()) < options_.branching) {
@@ -199,7 +180,7 @@ std::vector<Division> DivideLevel(const std::vector<BinaryDescriptor>& descripto
     const Cluster& cluster = clusters[index];
     if (cluster.size() < static_cast<std::size_t>(options.min_descriptors)) return;
     const std::span<std::uint32_t> part = std::span(members).subspan(cluster.begin, cluster.size());
-    RandomNumbers random(level_seed ^ static_cast<std::uint64_t>(index));
+    SplitMix64 random(level_seed ^ static_cast<std::uint64_t>(index));
     Division division = Divider(descriptors, part, options).Divide(random.Next());
     if (division.centers.size() > 1) divisions[index] = std::move(division);
   });
@@ -217,7 +198,7 @@ VocabularyTree GrowTree(const std::vector<BinaryDescriptor>& descriptors,
   Members members(descriptors.size());
   std::iota(members.begin(), members.end(), 0U);
   std::vector<Cluster> clusters = {{0, members.size()}};
-  RandomNumbers random(options.seed);
+  SplitMix64 random(options.seed);
   for (int level = 0; level < options.depth && !clusters.empty(); ++level) {
     if (progress) progress(level, options.depth);
     const std::vector<Division> divisions =

@@ -161,19 +161,4 @@ std::set<FrameId> SelectKeyframes(const RotationMap& cam_from_world,
   return keyframes;
 }
 
-std::vector<Track> RestrictTracks(const std::vector<Track>& tracks,
-                                  const std::set<FrameId>& frames,
-                                  int min_length) {
-  std::vector<Track> restricted;
-  for (const Track& track : tracks) {
-    Track kept = track;
-    std::erase_if(kept.observations, [&](const Observation& observation) {
-      return !frames.contains(observation.frame);
-    });
-    if (static_cast<int>(kept.observations.size()) >= min_length)
-      restricted.push_back(std::move(kept));
-  }
-  return restricted;
-}
-
 }  // namespace rotslam

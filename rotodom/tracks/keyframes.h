@@ -51,10 +51,4 @@ std::set<FrameId> SelectKeyframes(const RotationMap& cam_from_world,
                                   const std::vector<PureRotationSegment>& segments,
                                   const KeyframeOptions& options);
 
-/// Restricts the tracks to observations in `frames`; tracks with fewer than `min_length`
-/// observations are dropped.
-std::vector<Track> RestrictTracks(const std::vector<Track>& tracks,
-                                  const std::set<FrameId>& frames,
-                                  int min_length);
-
 }  // namespace rotslam

@@ -18,4 +18,13 @@ Eigen::Matrix2d Deblurring(const Eigen::Vector2f& blur) {
          (1.0 - 1.0 / std::sqrt(1.0 + squared)) / squared * s * s.transpose();
 }
 
+std::vector<Track> RestrictTracks(const std::vector<Track>& tracks,
+                                  const std::set<FrameId>& frames,
+                                  int min_length) {
+  const auto is_in_frames = [&](const Observation& observation) {
+    return frames.contains(observation.frame);
+  };
+  return RestrictTracks(tracks, is_in_frames, min_length);
+}
+
 }  // namespace rotslam

@@ -2,6 +2,9 @@
 
 #include <array>
 #include <cstdint>
+#include <iterator>
+#include <set>
+#include <utility>
 #include <vector>
 
 #include <Eigen/Core>
@@ -33,6 +36,27 @@ struct Track {
   std::vector<Observation> observations;
   std::array<std::uint8_t, 3> rgb = {128, 128, 128};
 };
+
+/// Restricts the tracks to the observations that fulfil `keep`; tracks with fewer than `min_length`
+/// of them are dropped.
+template <class Keep>
+std::vector<Track> RestrictTracks(const std::vector<Track>& tracks,
+                                  const Keep& keep,
+                                  int min_length) {
+  std::vector<Track> restricted;
+  for (const Track& track : tracks) {
+    Track kept{track.id, {}, track.rgb};
+    for (const Observation& observation : track.observations) {
+      if (keep(observation)) kept.observations.push_back(observation);
+    }
+    if (std::ssize(kept.observations) >= min_length) restricted.push_back(std::move(kept));
+  }
+  return restricted;
+}
+/// The same for the observations in `frames`.
+std::vector<Track> RestrictTracks(const std::vector<Track>& tracks,
+                                  const std::set<FrameId>& frames,
+                                  int min_length);
 
 /// Observations of all of them.
 int NumObservations(const std::vector<Track>& tracks);

@@ -190,15 +190,8 @@ SceneOptions DenseOrbitOptions(std::uint64_t seed) {
   return options;
 }
 
-std::uint64_t SceneRandom::Next() {  // splitmix64
-  std::uint64_t z = (state_ += 0x9E3779B97F4A7C15ull);
-  z = (z ^ (z >> 30)) * 0xBF58476D1CE4E5B9ull;
-  z = (z ^ (z >> 27)) * 0x94D049BB133111EBull;
-  return z ^ (z >> 31);
-}
-
 double SceneRandom::Uniform(double low, double high) {
-  return low + (high - low) * (static_cast<double>(Next() >> 11) * 0x1.0p-53);
+  return low + (high - low) * (static_cast<double>(random_.Next() >> 11) * 0x1.0p-53);
 }
 
 double SceneRandom::Normal(double sigma) {  // Box-Muller
@@ -212,9 +205,7 @@ Eigen::Vector3d SceneRandom::NormalVector(double sigma) {
   return {x, y, Normal(sigma)};
 }
 
-int SceneRandom::Index(int count) {
-  return static_cast<int>(Next() % static_cast<std::uint64_t>(count));
-}
+int SceneRandom::Index(int count) { return random_.Index(count); }
 
 Scene MakeScene(const SceneOptions& options) {
   Scene scene;

@@ -7,6 +7,7 @@
 
 #include "rotodom/camera/camera.h"
 #include "rotodom/types/maps.h"
+#include "rotodom/types/splitmix64.h"
 #include "rotodom/types/track.h"
 
 namespace rotslam {
@@ -59,15 +60,14 @@ SceneOptions DenseOrbitOptions(std::uint64_t seed);
 /// Uniform and normal numbers with the same sequence everywhere.
 class SceneRandom {
  public:
-  explicit SceneRandom(std::uint64_t seed) : state_(seed * 0x9E3779B97F4A7C15ull + 1) {}
+  explicit SceneRandom(std::uint64_t seed) : random_(seed * 0x9E3779B97F4A7C15ull + 1) {}
   double Uniform(double low, double high);
   double Normal(double sigma);
   Eigen::Vector3d NormalVector(double sigma);
   int Index(int count);  // in [0, count)
 
  private:
-  std::uint64_t Next();
-  std::uint64_t state_;
+  SplitMix64 random_;
 };
 
 }  // namespace rotslam

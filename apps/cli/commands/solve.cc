@@ -24,8 +24,8 @@
 #include "output/map/ply.h"
 #include "output/trajectory/trajectory.h"
 #include "rotodom/averaging/global_averaging.h"
-#include "rotodom/tracks/keyframes.h"
 #include "rotodom/types/stopwatch.h"
+#include "rotodom/types/track.h"
 
 namespace rotslam {
 namespace {

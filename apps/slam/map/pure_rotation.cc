@@ -10,8 +10,8 @@
 #include <utility>
 
 #include "apps/slam/map/refinement.h"
-#include "rotodom/tracks/keyframes.h"
 #include "rotodom/types/median.h"
+#include "rotodom/types/track.h"
 
 namespace rotslam {
 namespace {

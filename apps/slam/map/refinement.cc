@@ -9,7 +9,7 @@
 #include <map>
 #include <utility>
 
-#include "rotodom/tracks/keyframes.h"
+#include "rotodom/types/track.h"
 
 namespace rotslam {
 namespace {

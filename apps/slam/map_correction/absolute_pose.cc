@@ -7,7 +7,7 @@
 
 #include <opencv2/calib3d.hpp>
 
-#include "rotodom/types/draw.h"
+#include "rotodom/types/splitmix64.h"
 
 namespace rotslam {
 namespace {
@@ -69,12 +69,13 @@ std::optional<ResectedPose> FindAbsolutePose(const Camera& camera,
     }
     return num_inliers;
   };
-  Draw draw(seed);
+  SplitMix64 random(seed);
   std::optional<ResectionStart> best;
   int most_inliers = 0;
   int num_wanted = kMaxTriples;
   for (int k = 0; k < num_wanted; ++k) {
-    const std::array<int, 3> drawn = {draw.Index(count), draw.Index(count), draw.Index(count)};
+    const std::array<int, 3> drawn = {
+        random.Index(count), random.Index(count), random.Index(count)};
     if (drawn[0] == drawn[1] || drawn[1] == drawn[2] || drawn[2] == drawn[0]) continue;
     for (ResectionStart& pose : PosesOf({&seen[drawn[0]], &seen[drawn[1]], &seen[drawn[2]]})) {
       const int num_inliers = count_inliers(pose);
