@@ -35,7 +35,7 @@ PureRotationResult RefinePureRotation(const Camera& camera,
   // Rotations averaged under a wrong lens are several pixels off: nothing is left out at first, and
   // the loss keeps what does not fit from carrying them away.
   turning.bridge.refine_rotations = true;
-  turning.bridge.loss = "cauchy";
+  turning.bridge.loss = RobustLoss::kCauchy;
   turning.find_covariance = false;
   // Explanations are compared at the same loss and limit.
   turning.loss_spreads = 0.0;

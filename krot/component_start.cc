@@ -31,7 +31,7 @@ std::optional<ComponentStart> SolveSelected(const RotationMap& cam_from_world,
   if (named.problem.num_views() < 2) return std::nullopt;
   ComponentStart start;
   std::optional<MinimaxStructure> structure;
-  if (options.start == "positioning") {
+  if (options.start == KrotStart::kPositioning) {
     structure = SolveGlobalPositioning(named.problem, units.loose_rad);
   } else {
     RobustStart robust = SolveRobustStart(named.problem, units.gamma);
@@ -144,7 +144,7 @@ std::optional<ComponentStart> StartComponent(const RotationMap& cam_from_world,
                                              const KrotUnits& units) {
   const std::set<FrameId> members(component.views.begin(), component.views.end());
   // Programs alone take more than their length by being long.
-  const bool by_blocks = options.start != "positioning" &&
+  const bool by_blocks = options.start != KrotStart::kPositioning &&
                          component.views.size() > static_cast<std::size_t>(options.max_lp_views);
   std::optional<ComponentStart> start =
       by_blocks

@@ -18,7 +18,7 @@ struct ComponentStart {
 };
 
 /// Solves the robust start's programs over a spread of tracks, in blocks of views where there are
-/// more than options.max_lp_views, or global positioning over all with options.start "positioning",
+/// more than options.max_lp_views, or global positioning over all with options.start kPositioning,
 /// and places the views that they leave out, by resection.
 /// @param tracks             clean: finite unit bearings, frames ascending.
 /// @param component_options  what the component was found with, to find its blocks.

@@ -153,7 +153,7 @@ BisectionStatus BoundResidual(const RotationMap& cam_from_world,
   BisectionResult bracket;
   bracket.status = BisectionStatus::kIterationLimit;
   bracket.gamma_high = MaxBoxResidual(problem, kept.structure);
-  const bool decides = options.start == "bisection";
+  const bool decides = options.start == KrotStart::kBisection;
   if (options.use_bracket && (decides || problem.num_views() <= options.max_bracket_views)) {
     bracket = MinimiseMaxResidual(problem, options.bisection, &kept.structure);
     if (decides && bracket.gamma_high < kInfinity) {
@@ -220,7 +220,7 @@ std::optional<BisectionStatus> SolveComponent(const RotationMap& cam_from_world,
   TriangulatedTracks points = triangulate();
   const BisectionStatus bracket =
       BoundResidual(cam_from_world, tracks, points, options, units, centers, solution);
-  if (options.start == "bisection") points = triangulate();
+  if (options.start == KrotStart::kBisection) points = triangulate();
   Normalise(centers, tracks, points);
   const int number =
       solution.component.empty()

@@ -21,11 +21,13 @@ constexpr double kMaxOffAxisDeg = 80.0;
 
 }  // namespace
 
+std::span<const char* const> OptionWords(KrotStart) {
+  static constexpr const char* kWords[] = {"l1", "bisection", "positioning"};
+  return kWords;
+}
+
 std::optional<std::string> KrotOptions::Problem() const {
-  if (start != "l1" && start != "bisection" && start != "positioning") {
-    return "start is '" + start + "', must be l1, bisection or positioning";
-  }
-  if (start == "bisection" && !use_bracket) {
+  if (start == KrotStart::kBisection && !use_bracket) {
     return "start is 'bisection', which needs use_bracket";
   }
   if (!(threshold_px > 0.0)) return OutOfRange("threshold_px", threshold_px, "above 0");

@@ -2,6 +2,7 @@
 
 #include <cstdint>
 #include <optional>
+#include <span>
 #include <string>
 
 #include "krot/bracket/bisection_options.h"
@@ -9,14 +10,19 @@
 
 namespace rotslam {
 
+/// Which answer gives the positions. All lead bundle adjustment to one minimum.
+enum class KrotStart {
+  kL1,           // least sum of misses: forgives outliers, the better start for bundle adjustment
+  kBisection,    // least largest residual of what kL1 kept
+  kPositioning,  // rays nearest to what was seen (SolveGlobalPositioning), no linear programs
+};
+/// The words for them in option files: "l1", "bisection", "positioning".
+std::span<const char* const> OptionWords(KrotStart);
+
 /// All parts of the known-rotation solver. The defaults run a real sequence untouched.
 struct KrotOptions {
-  // Which answer gives the positions: "l1", the least sum of misses, forgives outliers and is the
-  // better start for bundle adjustment; "bisection", the least largest residual of what l1 kept;
-  // "positioning", rays nearest to what was seen (SolveGlobalPositioning), without linear programs.
-  // All lead bundle adjustment to one minimum.
-  // The bracket is found either way (see use_bracket).
-  std::string start = "l1";
+  // The bracket is found with any of them (see use_bracket).
+  KrotStart start = KrotStart::kL1;
   // Image bound of the L1 start: observations within it cost nothing. It must cover feature noise
   // and rotation error together: 0.3 deg moves a point by 3.7 px at f = 700.
   double threshold_px = 4.0;

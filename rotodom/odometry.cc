@@ -428,7 +428,7 @@ void RotationalOdometry::UpdateCovariance(FrameEstimate& estimate) {
   std::set<FrameId> free_views = ViewsToAverage(cam_from_world_, options_.averaging);
   const EdgeWithMatches* best = BestOf(estimate.connections);
   std::vector<SupportedEdge> edges;
-  const bool is_chained = options_.averaging.mode == "off";
+  const bool is_chained = options_.averaging.mode == AveragingMode::kOff;
   for (const EdgeWithMatches& connection : estimate.connections) {
     if (is_chained && &connection != best) continue;
     edges.push_back({connection.edge, connection.matches.pairs});
@@ -485,7 +485,7 @@ void RotationalOdometry::MeasureExposure() {
 }
 
 void RotationalOdometry::DropOldViews() {
-  if (options_.averaging.mode == "global") return;
+  if (options_.averaging.mode == AveragingMode::kGlobal) return;
   // Now and then is enough: a multiple of what is needed is still bounded.
   const std::size_t needed = static_cast<std::size_t>(options_.averaging.window) + 2;
   if (cam_from_world_.size() < 4 * (needed + keyframes_.size())) return;

@@ -9,8 +9,21 @@ namespace py = pybind11;
 namespace rotslam {
 namespace {
 
+[[noreturn]] void Refuse(const std::string& key,
+                         const std::string& expected,
+                         const py::handle& value) {
+  throw std::invalid_argument("\"" + key + "\" expects " + expected + ", found " +
+                              std::string(py::repr(value)));
+}
+
+void Assign(const std::string& key, const py::handle& value, const ChoiceField& choice) {
+  if (!py::isinstance<py::str>(value) || !choice.Assign(value.cast<std::string>())) {
+    Refuse(key, choice.AllWords(), value);
+  }
+}
+
 template <class Field>
-void Assign(const std::string& key, const py::handle& value, Field& field) {
+void Assign(const std::string& key, const py::handle& value, Field* field) {
   const bool is_bool = py::isinstance<py::bool_>(value);
   const bool is_int = py::isinstance<py::int_>(value) && !is_bool;
   bool fits = is_int;
@@ -27,13 +40,12 @@ void Assign(const std::string& key, const py::handle& value, Field& field) {
   }
   try {
     if (fits) {
-      field = value.cast<Field>();
+      *field = value.cast<Field>();
       return;
     }
   } catch (const py::cast_error&) {  // does not fit into the field
   }
-  throw std::invalid_argument("\"" + key + "\" expects " + expected + ", found " +
-                              std::string(py::repr(value)));
+  Refuse(key, expected, value);
 }
 
 void OverrideGroup(const py::dict& given,
@@ -49,7 +61,7 @@ void OverrideGroup(const py::dict& given,
     for (const OptionRef& option : options) {
       if (option.key != key) continue;
       found = true;
-      std::visit([&, v = value](auto* field) { Assign(key, v, *field); }, option.field);
+      std::visit([&, v = value](const auto& field) { Assign(key, v, field); }, option.field);
     }
     if (found) continue;
     const bool is_group = std::any_of(options.begin(), options.end(), [&](const OptionRef& option) {

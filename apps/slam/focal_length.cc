@@ -23,7 +23,7 @@ constexpr int kMaxPasses = 4;  // twice what a start that is 50 % off needs
 // Options without the stages that do not contribute to the focal length.
 SlamOptions OptionsOfPass(SlamOptions options) {
   options.loop.use_loops = false;
-  options.krot.use_bracket = options.krot.start == "bisection";
+  options.krot.use_bracket = options.krot.start == KrotStart::kBisection;
   options.ba.find_covariance = false;
   FreeFocalLength(options.ba.lens);
   return options;

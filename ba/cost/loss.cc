@@ -5,8 +5,9 @@
 namespace rotslam {
 
 std::unique_ptr<ceres::LossFunction> MakeLoss(const BundleRound& round) {
-  if (round.loss == "huber") return std::make_unique<ceres::HuberLoss>(round.loss_scale);
-  if (round.loss == "cauchy") return std::make_unique<ceres::CauchyLoss>(round.loss_scale);
+  if (round.loss == RobustLoss::kHuber) return std::make_unique<ceres::HuberLoss>(round.loss_scale);
+  if (round.loss == RobustLoss::kCauchy)
+    return std::make_unique<ceres::CauchyLoss>(round.loss_scale);
   return nullptr;
 }
 

@@ -6,9 +6,6 @@ namespace rotslam {
 std::optional<std::string> BundleRound::Problem() const {
   if (!(max_error_px >= 0.0)) return OutOfRange("max_error_px", max_error_px, "at least 0");
   if (!(max_residual >= 0.0)) return OutOfRange("max_residual", max_residual, "at least 0");
-  if (loss != "huber" && loss != "cauchy" && loss != "none") {
-    return OutOfRange("loss", loss, "huber, cauchy or none");
-  }
   if (!(loss_scale > 0.0)) return OutOfRange("loss_scale", loss_scale, "positive");
   if (max_iterations < 1) return OutOfRange("max_iterations", max_iterations, "at least 1");
   if (!(function_tolerance >= 0.0)) {

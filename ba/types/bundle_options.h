@@ -12,6 +12,9 @@ inline constexpr int kMinTrackObservations = 3;
 /// points follow any outlier. Twelve give four numbers for each unknown.
 inline constexpr int kMinFrameObservations = 12;
 
+/// How the cost grows with a residual.
+enum class RobustLoss { kNone, kHuber, kCauchy };
+
 /// One round of classification and minimisation.
 struct BundleRound {
   // Skip the round altogether.
@@ -25,8 +28,7 @@ struct BundleRound {
   // So are those whose residual, in sigmas, is above this; where sigma_px is below 1, in pixels.
   // Zero: no residual is.
   double max_residual = 0.0;
-  // "huber", "cauchy" or "none".
-  std::string loss = "huber";
+  RobustLoss loss = RobustLoss::kHuber;
   // Residual, in sigmas, at which the loss leaves the quadratic.
   double loss_scale = 1.0;
   // Levenberg-Marquardt steps.

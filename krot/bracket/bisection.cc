@@ -107,7 +107,8 @@ void Solve(const MinimaxProblem& problem,
     limits.only_feasible = result.status == BisectionStatus::kCancelled;
     MinimaxStructure part_start;
     if (start != nullptr) part_start = Restrict(*start, part);
-    const auto search = options.method == "interior" ? SearchBracket : BisectPrograms;
+    const auto search =
+        options.method == BisectionMethod::kInterior ? SearchBracket : BisectPrograms;
     const Bracket bracket =
         part.views.size() == 1
             ? SearchSingleView(part.problem, options)

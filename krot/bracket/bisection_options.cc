@@ -5,9 +5,6 @@
 namespace rotslam {
 
 std::optional<std::string> BisectionOptions::Problem() const {
-  if (method != "interior" && method != "programs") {
-    return "method is '" + method + "', must be interior or programs";
-  }
   if (!(relative_gap > 0.0)) {
     return OutOfRange("relative_gap", relative_gap, "above 0");
   }

@@ -16,12 +16,19 @@ struct BisectionProgress {
   int num_points = 0;  // in the program just solved
 };
 
+/// By which programs the bracket is narrowed.
+enum class BisectionMethod {
+  // Our own interior-point programs over the few points that hold the optimum, the LP engine where
+  // they stall.
+  kInterior,
+  // The LP engine alone, over all points: ten to a hundred times the time and memory, and no code
+  // in common but the proofs.
+  kPrograms,
+};
+
 /// How closely the bisection brackets the optimum, and by which programs.
 struct BisectionOptions {
-  // "interior": our own interior-point programs over the few points that hold the optimum, the LP
-  // engine where they stall. "programs": the LP engine alone, over all points; ten to a hundred
-  // times the time and memory, and no code in common but the proofs.
-  std::string method = "interior";
+  BisectionMethod method = BisectionMethod::kInterior;
   // Stop when gamma_high - gamma_low <= relative_gap * gamma_high. 1e-2 is what a start for bundle
   // adjustment needs; the linear programs stop telling the sides apart near 1e-4.
   double relative_gap = 1e-2;

@@ -1,7 +1,6 @@
 #include "rotodom/averaging/averaging.h"
 
 #include <algorithm>
-#include <array>
 #include <iterator>
 #include <stdexcept>
 #include <vector>
@@ -11,14 +10,6 @@
 
 namespace rotslam {
 namespace {
-
-struct NamedMode {
-  const char* name;
-  AveragingMode mode;
-};
-constexpr std::array<NamedMode, 3> kModes = {{{"off", AveragingMode::kOff},
-                                              {"window", AveragingMode::kWindow},
-                                              {"global", AveragingMode::kGlobal}}};
 
 // The L1 stage stops at steps below this, rad: it only computes a start.
 constexpr double kL1Step = 1e-3;
@@ -92,15 +83,12 @@ EdgeSystem MakeSystem(const std::vector<const RelativeRotation*>& edges,
 
 }  // namespace
 
-std::optional<AveragingMode> AveragingModeNamed(const std::string& name) {
-  for (const NamedMode& named : kModes) {
-    if (name == named.name) return named.mode;
-  }
-  return std::nullopt;
+std::span<const char* const> OptionWords(AveragingMode) {
+  static constexpr const char* kWords[] = {"off", "window", "global"};
+  return kWords;
 }
 
 std::optional<std::string> AveragingOptions::Problem() const {
-  if (!AveragingModeNamed(mode)) return OutOfRange("mode", mode, "off, window or global");
   if (window < 1) return OutOfRange("window", window, "at least 1");
   if (!(edge_floor_deg > 0.0)) return OutOfRange("edge_floor_deg", edge_floor_deg, "positive");
   if (!(edge_error_factor > 0.0)) {
@@ -125,12 +113,12 @@ std::set<FrameId> ViewsToAverage(const RotationMap& cam_from_world,
   if (const auto problem = options.Problem()) {
     throw std::invalid_argument("AveragingOptions: " + *problem);
   }
-  const AveragingMode mode = *AveragingModeNamed(options.mode);
   std::set<FrameId> views;
-  if (mode == AveragingMode::kOff || cam_from_world.empty()) return views;
+  if (options.mode == AveragingMode::kOff || cam_from_world.empty()) return views;
   const auto first = cam_from_world.begin();
   for (auto entry = std::prev(cam_from_world.end()); entry != first; --entry) {
-    if (mode == AveragingMode::kWindow && static_cast<int>(views.size()) == options.window) break;
+    if (options.mode == AveragingMode::kWindow && static_cast<int>(views.size()) == options.window)
+      break;
     views.insert(views.begin(), entry->first);
   }
   return views;

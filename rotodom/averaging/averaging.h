@@ -3,6 +3,7 @@
 #include <map>
 #include <optional>
 #include <set>
+#include <span>
 #include <string>
 
 #include "rotodom/types/maps.h"
@@ -16,13 +17,13 @@ enum class AveragingMode {
   kWindow,  // the newest `window`, older ones are fixed: constant time
   kGlobal,  // all: time grows with the sequence
 };
-/// "off", "window" or "global"; nullopt for another word.
-std::optional<AveragingMode> AveragingModeNamed(const std::string& name);
+/// The words for them in option files: "off", "window", "global".
+std::span<const char* const> OptionWords(AveragingMode);
 
 /// Of averaging over a window or a small view-graph.
 struct AveragingOptions {
-  // What is averaged at every frame: off, window or global.
-  std::string mode = "window";
+  // What is averaged at every frame.
+  AveragingMode mode = AveragingMode::kWindow;
   // Newest orientations that stay free in the incremental solve; the paper's |R|.
   int window = 10;
   // Standard deviation added to every edge's covariance, so that no edge is believed without limit.

@@ -34,7 +34,7 @@ LoopedOdometry::LoopedOdometry(const Camera& camera,
       keep_features_(keep_features),
       orientations_(odometry.averaging, loops, keep_features, num_threads) {
   // Without averaging the orientations are those of the odometry, chained.
-  if (!loops.use_loops || odometry.averaging.mode == "off") return;
+  if (!loops.use_loops || odometry.averaging.mode == AveragingMode::kOff) return;
   if (!vocabulary) vocabulary = std::make_shared<const Vocabulary>(DefaultVocabulary());
   closure_.emplace(camera, loops, odometry, std::move(vocabulary), seed, num_threads);
 }

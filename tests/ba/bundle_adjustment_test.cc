@@ -651,8 +651,8 @@ TEST(RefineBundle, RefusesBrokenContracts) {
   });
   refuses([&](BundleProblem& p) { p.camera.fx = 0.0; });
   BundleOptions options;
-  options.fine.loss = "tukey";
-  EXPECT_EQ(options.Problem(), "fine.loss is tukey, must be huber, cauchy or none");
+  options.fine.loss_scale = 0.0;
+  EXPECT_EQ(options.Problem(), "fine.loss_scale is 0, must be positive");
   EXPECT_THROW(RefineBundle(good, options), std::invalid_argument);
 }
 

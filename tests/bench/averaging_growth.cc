@@ -39,11 +39,11 @@ struct Growth {
 };
 
 // Every frame starts from its edge to the frame before.
-Growth Measure(const RotationGraph& scene, const std::string& mode) {
+Growth Measure(const RotationGraph& scene, AveragingMode mode) {
   AveragingOptions options;
   options.mode = mode;
   Growth growth;
-  growth.name = mode;
+  growth.name = OptionWords(mode)[static_cast<std::size_t>(mode)];
   RotationMap rotations = {{FrameId{0}, Rotation()}};
   growth.milliseconds.push_back(0.0);
   for (int k = 1; k < kNumViews; ++k) {
@@ -156,7 +156,8 @@ class Plot {
 int WriteGrowth(const std::filesystem::path& folder) {
   const RotationGraph scene =
       MakeRotationGraph({.num_views = kNumViews, .keyframe_every = 8, .wrong_ratio = 0.05});
-  const std::vector<Growth> growths = {Measure(scene, "window"), Measure(scene, "global")};
+  const std::vector<Growth> growths = {Measure(scene, AveragingMode::kWindow),
+                                       Measure(scene, AveragingMode::kGlobal)};
   WriteCsv(folder / "averaging_growth.csv", growths);
   Plot plot;
   const std::array<cv::Scalar, 2> colours = {cv::Scalar(180, 90, 20), cv::Scalar(40, 60, 200)};

@@ -117,7 +117,7 @@ void Measure(const std::string& name, const SceneOptions& scene, const Limits& l
     Apart([&] {
       const MinimaxProblem problem = ProblemFromScene(MakeScene(scene));
       BisectionOptions options;
-      options.method = "programs";
+      options.method = BisectionMethod::kPrograms;
       options.max_programs = 40;
       PrintBracket(name + " CLP all", problem, options);
     });

@@ -164,7 +164,7 @@ void Report(const TestSequence& test) {
   for (int k = 0; k < static_cast<int>(test.truth.size()); ++k) images.push_back(test.image(k));
   OdometryOptions options;
   const Accuracy windowed = Measure(test, images, options);
-  options.averaging.mode = "off";
+  options.averaging.mode = AveragingMode::kOff;
   const Accuracy chained = Measure(test, images, options);
   std::printf("%-12s %4zu frames %5.1f ms | RPE_1 chained %.4f window %.4f online %.4f\n",
               test.name.c_str(),

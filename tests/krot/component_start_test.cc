@@ -54,7 +54,7 @@ TEST(StartComponent, FindsCentresByPrograms) {
 TEST(StartComponent, FindsCentresByGlobalPositioning) {
   const Scene scene = StreetOf(24);
   KrotOptions options;
-  options.start = "positioning";
+  options.start = KrotStart::kPositioning;
   const auto start = StartOf(scene, options);
   ASSERT_TRUE(start.has_value());
   EXPECT_EQ(start->centers.size(), 24U);

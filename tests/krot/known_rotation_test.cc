@@ -35,7 +35,7 @@ CenterError ErrorOf(const KrotSolution& solution, const Scene& scene) {
 
 TEST(SolveKnownRotation, FindsTheTruthOnCleanScenes) {
   for (const ScenePath path : {ScenePath::kRing, ScenePath::kRandom, ScenePath::kStreet}) {
-    for (const char* start : {"l1", "bisection", "positioning"}) {
+    for (const KrotStart start : {KrotStart::kL1, KrotStart::kBisection, KrotStart::kPositioning}) {
       SceneOptions scene_options = Street(10, 200);
       scene_options.path = path;
       const Scene scene = MakeScene(scene_options);
@@ -47,7 +47,8 @@ TEST(SolveKnownRotation, FindsTheTruthOnCleanScenes) {
       EXPECT_EQ(solution.center_in_world.begin()->second.norm(), 0.0);
       const Similarity align =
           AlignCentersKnownRotation(solution.center_in_world, scene.true_center_in_world);
-      EXPECT_LT(ErrorOf(solution, scene).max, 1e-5) << static_cast<int>(path) << start;
+      EXPECT_LT(ErrorOf(solution, scene).max, 1e-5)
+          << static_cast<int>(path) << static_cast<int>(start);
       EXPECT_LT(MaxPointError(solution.point_in_world, scene.true_point_in_world, align), 1e-4);
       EXPECT_TRUE(solution.removed.empty());
     }
@@ -118,7 +119,7 @@ TEST(SolveKnownRotation, TenPercentOutliersAreRemovedAndChangeLittle) {
   for (const Track& track : scene.tracks) {
     num_observations += static_cast<int>(track.observations.size());
   }
-  for (const char* start : {"l1", "positioning"}) {
+  for (const KrotStart start : {KrotStart::kL1, KrotStart::kPositioning}) {
     KrotOptions options;
     options.start = start;
     const KrotSolution solution = Solve(scene, options);
@@ -127,9 +128,9 @@ TEST(SolveKnownRotation, TenPercentOutliersAreRemovedAndChangeLittle) {
     for (const RemovedObservation& removed : solution.removed) {
       caught += scene.outliers.contains({removed.track, removed.frame});
     }
-    EXPECT_GT(caught, 0.95 * static_cast<double>(scene.outliers.size())) << start;
+    EXPECT_GT(caught, 0.95 * static_cast<double>(scene.outliers.size())) << static_cast<int>(start);
     EXPECT_LT(static_cast<double>(solution.removed.size()) - caught, 0.02 * num_observations);
-    EXPECT_LT(ErrorOf(solution, scene).max, 1.0) << start;
+    EXPECT_LT(ErrorOf(solution, scene).max, 1.0) << static_cast<int>(start);
   }
 }
 
@@ -171,7 +172,7 @@ TEST(SolveKnownRotation, LargeComponentsGoWithoutABracketButForPositionsThatNeed
   EXPECT_GE(large.gamma_high, whole.gamma_low);
   EXPECT_EQ(large.num_bracket_observations, whole.num_bracket_observations);
   EXPECT_EQ(large.center_in_world, whole.center_in_world);
-  options.start = "bisection";
+  options.start = KrotStart::kBisection;
   EXPECT_EQ(Solve(scene, options).status, KrotStatus::kConverged);
   options.max_bracket_views = 0;
   EXPECT_THROW(Solve(scene, options), std::invalid_argument);
@@ -208,7 +209,7 @@ TEST(SolveKnownRotation, SolvesInBlocksWhatIsLongerThanOneProgram) {
   EXPECT_EQ(solution.num_grown_views, 0);
   EXPECT_LT(ErrorOf(solution, scene).max, 3.0 * whole);
   // Without programs there are no blocks.
-  options.start = "positioning";
+  options.start = KrotStart::kPositioning;
   options.use_bracket = false;
   const KrotSolution positioned = Solve(scene, options);
   EXPECT_EQ(positioned.center_in_world.size(), 40u);
@@ -393,7 +394,8 @@ TEST(SolveKnownRotation, BrokenContractsThrow) {
   options.threshold_px = 0.0;
   EXPECT_THROW(Solve(scene, options), std::invalid_argument);
   options = {};
-  options.start = "l2";
+  options.start = KrotStart::kBisection;
+  options.use_bracket = false;
   EXPECT_THROW(Solve(scene, options), std::invalid_argument);
   scene.camera.fx = scene.camera.fy = 0.0;
   EXPECT_THROW(Solve(scene), std::invalid_argument);

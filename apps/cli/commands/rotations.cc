@@ -14,6 +14,7 @@
 #include "apps/cli/terminal/interruption.h"
 #include "apps/cli/terminal/progress.h"
 #include "apps/cli/terminal/slam_progress.h"
+#include "output/files/option_list.h"
 #include "rotodom/types/stopwatch.h"
 
 namespace rotslam {
@@ -33,7 +34,7 @@ int FindAndWriteRotations(const RotationsFlags& flags) {
   Progress progress(flags.common);
   // The whole pipeline's options, so that one configuration file serves `run` and `rotations`.
   RunOptions options = ReadRunOptions(flags.common, flags.input);
-  if (!flags.averaging.empty()) options.rotodom.averaging.mode = flags.averaging;
+  if (!flags.averaging.empty()) ChoiceField(options.rotodom.averaging.mode).Assign(flags.averaging);
 
   Input input = OpenInput(
       flags.input, options.sequence, [&](const std::string& line) { progress.Say(line); });

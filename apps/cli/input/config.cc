@@ -92,7 +92,7 @@ std::string Shown(const YAML::Node& node) {
 }
 
 template <class Field>
-std::string Expected() {
+std::string Expected(const Field*) {
   if constexpr (std::is_same_v<Field, bool>) return "true or false";
   if constexpr (std::is_same_v<Field, int>) return "a whole number";
   if constexpr (std::is_same_v<Field, std::uint64_t>) return "a whole number from 0";
@@ -100,8 +100,10 @@ std::string Expected() {
   return "text";
 }
 
+std::string Expected(const ChoiceField& choice) { return choice.AllWords(); }
+
 template <class Field>
-bool Assign(const YAML::Node& node, Field& field) {
+bool Assign(const YAML::Node& node, Field* field) {
   if (!node.IsScalar()) return false;
   if constexpr (std::is_unsigned_v<Field> && !std::is_same_v<Field, bool>) {
     if (node.Scalar().starts_with('-')) return false;
@@ -111,8 +113,12 @@ bool Assign(const YAML::Node& node, Field& field) {
   if constexpr (std::is_same_v<Field, double>) {
     if (std::isnan(value)) return false;
   }
-  field = std::move(value);
+  *field = std::move(value);
   return true;
+}
+
+bool Assign(const YAML::Node& node, const ChoiceField& choice) {
+  return node.IsScalar() && choice.Assign(node.Scalar());
 }
 
 class Loader {
@@ -150,11 +156,9 @@ class Loader {
       Refuse(name, vocabulary_.Unknown(key));
     }
     std::visit(
-        [&](auto* field) {
-          using Field = std::remove_pointer_t<decltype(field)>;
-          if (!Assign(value, *field)) {
-            Refuse(name,
-                   "\"" + key + "\" expects " + Expected<Field>() + ", found " + Shown(value));
+        [&](const auto& field) {
+          if (!Assign(value, field)) {
+            Refuse(name, "\"" + key + "\" expects " + Expected(field) + ", found " + Shown(value));
           }
         },
         option->second->field);

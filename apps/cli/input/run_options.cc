@@ -3,6 +3,7 @@
 #include <stdexcept>
 
 #include "apps/cli/input/config.h"
+#include "output/files/option_list.h"
 #include "rotodom/types/options.h"
 
 namespace rotslam {
@@ -13,10 +14,10 @@ std::optional<std::string> RunOptions::Problem() const {
 }
 
 void KrotFlags::Override(KrotOptions& options) const {
-  if (!start.empty()) options.start = start;
+  if (!start.empty()) ChoiceField(options.start).Assign(start);
   if (!no_certificate) return;
   options.use_bracket = false;
-  if (options.start != "bisection") return;
+  if (options.start != KrotStart::kBisection) return;
   throw std::runtime_error(
       "--no-certificate leaves out the bisection that --krot bisection asks for");
 }

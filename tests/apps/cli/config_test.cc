@@ -1,5 +1,9 @@
 #include "apps/cli/input/config.h"
 
+#include <algorithm>
+#include <span>
+#include <variant>
+
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
@@ -20,10 +24,17 @@ struct MatchingOptions {
   }
 };
 
+enum class Engine { kClp, kGlpk, kOwn };
+std::span<const char* const> OptionWords(Engine) {
+  static constexpr const char* kWords[] = {"clp", "glpk", "own"};
+  return kWords;
+}
+
 struct AllOptions {
   int max_features = 2000;
   std::uint64_t seed = 1;
-  std::string engine = "clp";
+  std::string name = "run";
+  Engine engine = Engine::kClp;
   MatchingOptions relocalisation;
   MatchingOptions matching;
 
@@ -35,6 +46,7 @@ struct AllOptions {
   void Visit(Visitor&& visit) {
     visit("max_features", max_features);
     visit("seed", seed);
+    visit("name", name);
     visit("engine", engine);
     visit("relocalisation", relocalisation);
     visit("matching", matching);
@@ -58,7 +70,7 @@ TEST(LoadOptionsYaml, OverridesWhatItNamesAndNothingElse) {
       "  use_mutual: no\n");
   EXPECT_EQ(options.max_features, 500);
   EXPECT_EQ(options.seed, 18446744073709551615u);
-  EXPECT_EQ(options.engine, "clp");
+  EXPECT_EQ(options.engine, Engine::kClp);
   EXPECT_EQ(options.matching.max_distance_px, 10.0);
   EXPECT_FALSE(options.matching.use_mutual);
 }
@@ -104,8 +116,22 @@ TEST(LoadOptionsYaml, NamesKeyValueAndType) {
   EXPECT_THAT(ErrorOf("matching: {use_mutual: 3}\n"), HasSubstr("expects true or false"));
   EXPECT_THAT(ErrorOf("matching: {max_distance_px: .nan}\n"), HasSubstr("expects a number"));
   EXPECT_THAT(ErrorOf("matching: {max_distance_px: [1]}\n"), HasSubstr("found a list"));
-  EXPECT_THAT(ErrorOf("engine:\n"), HasSubstr("expects text, found nothing"));
+  EXPECT_THAT(ErrorOf("name:\n"), HasSubstr("expects text, found nothing"));
   EXPECT_THAT(ErrorOf("matching: 3\n"), HasSubstr("is a group of options"));
+}
+
+TEST(LoadOptionsYaml, ReadsWordsOfEnums) {
+  EXPECT_EQ(Load("engine: own\n").engine, Engine::kOwn);
+  EXPECT_THAT(ErrorOf("engine: cplex\n"),
+              HasSubstr("o.yaml:1: \"engine\" expects clp, glpk or own, found \"cplex\""));
+  EXPECT_THAT(ErrorOf("engine: [own]\n"), HasSubstr("found a list"));
+  AllOptions options;
+  options.engine = Engine::kGlpk;
+  const std::vector<OptionEntry> entries = DescribeOptions(options);
+  const auto engine = std::find_if(
+      entries.begin(), entries.end(), [](const auto& entry) { return entry.key == "engine"; });
+  ASSERT_NE(engine, entries.end());
+  EXPECT_EQ(std::get<std::string>(engine->value), "glpk");
 }
 
 TEST(LoadOptionsYaml, RefusesWhatIsNoMapAndKeysTwice) {

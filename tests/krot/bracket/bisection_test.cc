@@ -18,7 +18,7 @@ std::vector<BisectionOptions> AllWays() {
   for (const LpEngine engine : {LpEngine::kClp, LpEngine::kGlpk}) {
     if (!HasLpEngine(engine)) continue;
     BisectionOptions options;
-    options.method = "programs";
+    options.method = BisectionMethod::kPrograms;
     options.lp.engine = engine;
     ways.push_back(options);
   }
@@ -97,7 +97,7 @@ TEST(MinimiseMaxResidual, FindsThousandthsOnRequest) {
 TEST(MinimiseMaxResidual, AgreesWithAllPointsOnADrive) {
   const MinimaxProblem problem = ProblemFromScene(MakeScene(DrivingOptions(12, 150, 4)));
   BisectionOptions programs;
-  programs.method = "programs";
+  programs.method = BisectionMethod::kPrograms;
   const BisectionResult few = MinimiseMaxResidual(problem, {});
   const BisectionResult all = MinimiseMaxResidual(problem, programs);
   EXPECT_EQ(few.status, BisectionStatus::kConverged);
@@ -248,7 +248,7 @@ TEST(MinimiseMaxResidual, RefusesWhatIsNoProblem) {
   broken.R_c_w[1](0, 0) = kInfinity;
   EXPECT_THROW(MinimiseMaxResidual(broken, {}), std::invalid_argument);
   BisectionOptions options;
-  options.method = "guess";
+  options.relative_gap = 0.0;
   EXPECT_THROW(MinimiseMaxResidual(problem, options), std::invalid_argument);
   const MinimaxStructure short_start;
   EXPECT_THROW(MinimiseMaxResidual(problem, {}, &short_start), std::invalid_argument);

@@ -88,13 +88,13 @@ TEST(MinimiseMaxResidual, InteriorBracketsHoldInExactArithmetic) { ExpectTrueBra
 
 TEST(MinimiseMaxResidual, ClpBracketsHoldInExactArithmetic) {
   BisectionOptions options;
-  options.method = "programs";
+  options.method = BisectionMethod::kPrograms;
   ExpectTrueBrackets(500, options);
 }
 
 TEST(MinimiseMaxResidual, GlpkBracketsHoldInExactArithmetic) {
   BisectionOptions options;
-  options.method = "programs";
+  options.method = BisectionMethod::kPrograms;
   options.lp.engine = LpEngine::kGlpk;
   ExpectTrueBrackets(500, options);
 }

@@ -70,7 +70,7 @@ Processed Process(const TrackedEdges& scene, const AveragingOptions& options, bo
          AverageRotations(graph, run.cam_from_world, free_views, options)) {
       run.cam_from_world[moved] = rotation;
     }
-    if (options.mode == "off") {
+    if (options.mode == AveragingMode::kOff) {
       free_views = {view};
       if (!supported.empty()) supported = {supported.back()};
     }
@@ -157,7 +157,7 @@ TEST_P(InWorlds, IsCalibrated) {
   EXPECT_LT(window.settled, 2.0);
   // With 40 seeds: 0.69 to 1.89.
   AveragingOptions options = WithoutModelError();
-  options.mode = "off";
+  options.mode = AveragingMode::kOff;
   const Calibration chain = Calibrate(scenes, options);
   EXPECT_GT(chain.newest, 0.5);
   EXPECT_LT(chain.newest, 2.2);
@@ -305,7 +305,7 @@ TEST_P(OfTheWholeScheme, EqualsTheDerivative) {
 TEST(OrientationCovariance, OfAChainIsTheSumOfItsEdges) {
   const TrackedEdges scene = IndependentEdges({.num_views = 25, .reach = 1, .noise_deg = 0.1});
   AveragingOptions options;
-  options.mode = "off";
+  options.mode = AveragingMode::kOff;
   options.edge_error_factor = 2.0;
   options.lasting_share = 0.0;
   const Processed run = Process(scene, options);

@@ -277,7 +277,7 @@ TEST(LoopedOdometry, IsTheOdometryWithoutLoops) {
 
 TEST(LoopedOdometry, ChainsWhereNothingIsAveraged) {
   OdometryOptions options = FewFeatures();
-  options.averaging.mode = "off";
+  options.averaging.mode = AveragingMode::kOff;
   const LoopedRun run = Follow(Images(), options);
   EXPECT_EQ(run.num_places, 0);
   ExpectSameBytes(run.result.cam_from_world, PlainOdometry(Images(), options));

@@ -61,10 +61,10 @@ Scene WithDrift(Scene scene) {
   return scene;
 }
 
-BundleResult SolveChain(const Scene& scene, const std::string& start) {
+BundleResult SolveChain(const Scene& scene, KrotStart start) {
   KrotOptions krot_options;
   krot_options.start = start;
-  krot_options.use_bracket = start == "bisection";
+  krot_options.use_bracket = start == KrotStart::kBisection;
   const KrotSolution krot =
       SolveKnownRotation(scene.cam_from_world, scene.tracks, scene.camera, krot_options);
   EXPECT_TRUE(krot.Usable()) << krot.message;
@@ -85,23 +85,24 @@ double ErrorOf(const BundleResult& bundle, const Scene& scene) {
 // That another of the known-rotation solver's answers leads where the least sum of misses leads, to
 // within these shares of the observations and of the cost.
 void ExpectOneMinimum(const Scene& scene,
-                      const std::string& start,
+                      KrotStart start,
                       double observation_share,
                       double cost_share) {
-  const BundleResult l1 = SolveChain(scene, "l1");
+  const BundleResult l1 = SolveChain(scene, KrotStart::kL1);
   const BundleResult other = SolveChain(scene, start);
   EXPECT_NEAR(static_cast<double>(other.summary.num_observations) / l1.summary.num_observations,
               1.0,
               observation_share)
-      << start;
-  EXPECT_NEAR(other.summary.final_cost / l1.summary.final_cost, 1.0, cost_share) << start;
+      << static_cast<int>(start);
+  EXPECT_NEAR(other.summary.final_cost / l1.summary.final_cost, 1.0, cost_share)
+      << static_cast<int>(start);
   EXPECT_NE(other.summary.rounds.front().initial_cost, l1.summary.rounds.front().initial_cost);
 }
 
 TEST(Chain, ThreeStartsEndInOneMinimum) {
   const Scene scene = WithOutliers(MakeScene(Street()), 0.05);
-  ExpectOneMinimum(scene, "bisection", 1e-3, 1e-3);
-  ExpectOneMinimum(scene, "positioning", 1e-3, 1e-3);
+  ExpectOneMinimum(scene, KrotStart::kBisection, 1e-3, 1e-3);
+  ExpectOneMinimum(scene, KrotStart::kPositioning, 1e-3, 1e-3);
 }
 
 // Every third track drifts: the loss and the limit are then as wide as the residuals turn out.
@@ -115,12 +116,12 @@ Scene DriftingScene(int num_points) {
 }
 
 TEST(Chain, LInfinityAndL1EndInOneMinimumWhereSomeTracksDrift) {
-  ExpectOneMinimum(DriftingScene(6000), "bisection", 5e-5, 1e-4);
+  ExpectOneMinimum(DriftingScene(6000), KrotStart::kBisection, 5e-5, 1e-4);
 }
 
 // It comes from further away, and one observation at the limit is 3.5e-4 of the smaller one's cost.
 TEST(Chain, PositioningAndL1EndInOneMinimumWhereSomeTracksDrift) {
-  ExpectOneMinimum(DriftingScene(24000), "positioning", 5e-5, 1e-4);
+  ExpectOneMinimum(DriftingScene(24000), KrotStart::kPositioning, 5e-5, 1e-4);
 }
 
 // A street whose last views do not know the tracks of those before: two components.
@@ -206,7 +207,8 @@ TEST_F(TwoComponents, BecomeOneThatExplainsMore) {
   ASSERT_EQ(refined_.bundles.size(), 1U);
   EXPECT_EQ(refined_.components[0].keyframes.size(), 30U);
   ExpectEffortBeside(parts);
-  EXPECT_LT(ErrorOf(refined_.bundles[0], scene_), 2.0 * ErrorOf(SolveChain(scene_, "l1"), scene_));
+  EXPECT_LT(ErrorOf(refined_.bundles[0], scene_),
+            2.0 * ErrorOf(SolveChain(scene_, KrotStart::kL1), scene_));
 }
 
 TEST_F(TwoComponents, StayWhereTheOneExplainsLess) {
@@ -317,11 +319,12 @@ TEST_P(ChainWithOutliers, RemovesThemAndKeepsTheRest) {
     options.seed = seed;
     const Scene clean = MakeScene(options);
     const Scene dirty = WithOutliers(clean, GetParam());
-    const BundleResult with = SolveChain(dirty, "l1");
+    const BundleResult with = SolveChain(dirty, KrotStart::kL1);
     const Kept kept = KeptOf(with, dirty);
     EXPECT_LE(kept.outliers, 0.05) << seed;
     EXPECT_GE(kept.inliers, 0.98) << seed;
-    EXPECT_LE(ErrorOf(with, dirty), 1.5 * ErrorOf(SolveChain(clean, "l1"), clean)) << seed;
+    EXPECT_LE(ErrorOf(with, dirty), 1.5 * ErrorOf(SolveChain(clean, KrotStart::kL1), clean))
+        << seed;
   }
 }
 
