@@ -41,12 +41,13 @@ BundleState WithSomeTracks(const BundleState& state, int num_wanted) {
   std::vector<int> count(state.frames.size(), 0);
   std::vector<bool> taken(state.tracks.size(), false);
   for (const std::size_t t : order) {
-    const std::vector<Sight>& sights = state.tracks[t].sights;
-    taken[t] = std::any_of(sights.begin(), sights.end(), [&](const Sight& sight) {
-      return count[sight.frame] < num_wanted;
-    });
+    const std::vector<ObservationState>& observations = state.tracks[t].observations;
+    taken[t] =
+        std::any_of(observations.begin(), observations.end(), [&](const ObservationState& one) {
+          return count[one.frame] < num_wanted;
+        });
     if (!taken[t]) continue;
-    for (const Sight& sight : sights) ++count[sight.frame];
+    for (const ObservationState& one : observations) ++count[one.frame];
   }
   BundleState part;
   part.camera = state.camera;
@@ -70,7 +71,7 @@ void TakeCameras(const BundleState& part, int num_threads, BundleState& state) {
 std::vector<bool> UsedFlags(const BundleState& state) {
   std::vector<bool> flags;
   for (const TrackState& track : state.tracks) {
-    for (const Sight& sight : track.sights) flags.push_back(sight.used);
+    for (const ObservationState& one : track.observations) flags.push_back(one.used);
   }
   return flags;
 }
@@ -255,10 +256,10 @@ Reconstruction MapOf(const BundleState& state) {
     if (entry.kind != TrackKind::kPoint) continue;
     Track track = *entry.track;
     track.observations.clear();
-    for (const Sight& sight : entry.sights) {
-      if (!sight.used) continue;
-      track.observations.push_back(*sight.observation);
-      track.observations.back().bearing = sight.bearing;
+    for (const ObservationState& one : entry.observations) {
+      if (!one.used) continue;
+      track.observations.push_back(*one.observation);
+      track.observations.back().bearing = one.bearing;
     }
     map.point_in_world[track.id] = entry.position;
     map.tracks.push_back(std::move(track));
@@ -287,10 +288,10 @@ void TakeResult(const BundleProblem& problem, const BundleState& state, BundleRe
   std::vector<bool> center_seen(state.centers.size(), false);
   for (const TrackState& entry : state.tracks) {
     if (entry.kind == TrackKind::kOut) continue;
-    for (const Sight& sight : entry.sights) {
-      if (!sight.used) continue;
-      frame_turned[sight.frame] = true;
-      if (entry.kind == TrackKind::kPoint) center_seen[state.frames[sight.frame].center] = true;
+    for (const ObservationState& one : entry.observations) {
+      if (!one.used) continue;
+      frame_turned[one.frame] = true;
+      if (entry.kind == TrackKind::kPoint) center_seen[state.frames[one.frame].center] = true;
     }
   }
   Reconstruction& out = result.reconstruction;
@@ -389,7 +390,7 @@ Reconstruction WithoutShallowPoints(const Reconstruction& reconstruction, double
   for (const Track& track : reconstruction.tracks) {
     const auto point = reconstruction.point_in_world.find(track.id);
     if (point == reconstruction.point_in_world.end()) continue;
-    std::vector<Sighting> sightings;
+    std::vector<PosedRay> rays;
     for (const Observation& observation : track.observations) {
       const auto cam_from_world = reconstruction.cam_from_world.find(observation.frame);
       const auto center = reconstruction.center_in_world.find(observation.frame);
@@ -397,9 +398,9 @@ Reconstruction WithoutShallowPoints(const Reconstruction& reconstruction, double
           center == reconstruction.center_in_world.end()) {
         continue;
       }
-      sightings.push_back({cam_from_world->second, center->second, observation.bearing});
+      rays.push_back({cam_from_world->second, center->second, observation.bearing});
     }
-    if (TriangulationAngle(sightings, point->second) < min_angle_deg * kRadFromDeg) continue;
+    if (TriangulationAngle(rays, point->second) < min_angle_deg * kRadFromDeg) continue;
     result.point_in_world.insert(*point);
     result.tracks.push_back(track);
   }

@@ -56,57 +56,58 @@ struct Normal {
 class Resection {
  public:
   Resection(const Camera& camera,
-            const std::vector<PointSighting>& sightings,
+            const std::vector<PointObservation2D3D>& observations,
             const ResectionStart& start,
             const ResectionOptions& options)
-      : camera_(camera), sightings_(sightings), start_(start), options_(options) {
+      : camera_(camera), observations_(observations), start_(start), options_(options) {
     if (start.rotation_covariance) prior_information_ = start.rotation_covariance->inverse();
   }
 
   // Sigmas per pixel.
-  Eigen::Matrix2d ScaleOf(const PointSighting& sighting) const {
-    if (!options_.has_motion_blur) return Eigen::Matrix2d::Identity() / sighting.sigma_px;
-    return Deblurring(sighting.blur) / sighting.sigma_px;
+  Eigen::Matrix2d ScaleOf(const PointObservation2D3D& observation) const {
+    if (!options_.has_motion_blur) return Eigen::Matrix2d::Identity() / observation.sigma_px;
+    return Deblurring(observation.blur) / observation.sigma_px;
   }
 
   // Residual in sigmas; what does not project is far off.
-  double Sigmas(const Pose& pose, const PointSighting& sighting) const {
+  double Sigmas(const Pose& pose, const PointObservation2D3D& observation) const {
     const auto pixel = Reproject(
-        camera_, pose.cam_from_world.Matrix(), pose.center_in_world, sighting.point_in_world);
-    if (!pixel) return kUnseenResidual_px / sighting.sigma_px;
-    return (ScaleOf(sighting) * (*pixel - sighting.keypoint_px)).norm();
+        camera_, pose.cam_from_world.Matrix(), pose.center_in_world, observation.point_in_world);
+    if (!pixel) return kUnseenResidual_px / observation.sigma_px;
+    return (ScaleOf(observation) * (*pixel - observation.keypoint_px)).norm();
   }
 
   double MedianSigmas(const Pose& pose) const {
     std::vector<double> sigmas;
-    for (const PointSighting& sighting : sightings_) sigmas.push_back(Sigmas(pose, sighting));
+    for (const PointObservation2D3D& observation : observations_)
+      sigmas.push_back(Sigmas(pose, observation));
     return Median(std::move(sigmas));
   }
 
-  bool IsInlier(const Pose& pose, const PointSighting& sighting) const {
-    return Sigmas(pose, sighting) * sighting.sigma_px <=
-           options_.max_error_px * std::max(1.0, sighting.sigma_px);
+  bool IsInlier(const Pose& pose, const PointObservation2D3D& observation) const {
+    return Sigmas(pose, observation) * observation.sigma_px <=
+           options_.max_error_px * std::max(1.0, observation.sigma_px);
   }
 
   // `scale`: of Geman-McClure's loss s^2 / 2 r^2 / (r^2 + s^2); zero: inliers, plainly weighted.
   Normal Evaluate(const Pose& pose, double scale) const {
     Normal normal;
     const Eigen::Matrix3d R_c_w = pose.cam_from_world.Matrix();
-    for (const PointSighting& sighting : sightings_) {
-      if (scale == 0.0 && !IsInlier(pose, sighting)) continue;
+    for (const PointObservation2D3D& observation : observations_) {
+      if (scale == 0.0 && !IsInlier(pose, observation)) continue;
       ReprojectionJacobian J;
       const auto pixel =
-          Reproject(camera_, R_c_w, pose.center_in_world, sighting.point_in_world, &J);
+          Reproject(camera_, R_c_w, pose.center_in_world, observation.point_in_world, &J);
       const Eigen::Vector2d residual =
-          pixel ? Eigen::Vector2d(ScaleOf(sighting) * (*pixel - sighting.keypoint_px))
-                : Eigen::Vector2d::Constant(kUnseenResidual_px / sighting.sigma_px);
+          pixel ? Eigen::Vector2d(ScaleOf(observation) * (*pixel - observation.keypoint_px))
+                : Eigen::Vector2d::Constant(kUnseenResidual_px / observation.sigma_px);
       const double squared = residual.squaredNorm();
       const double keep = scale == 0.0 ? 1.0 : scale * scale / (squared + scale * scale);
       normal.cost += 0.5 * squared * keep;
       if (!pixel) continue;
       Eigen::Matrix<double, 2, 6> J_pose;
       J_pose << J.by_rotation, J.by_center;
-      J_pose = ScaleOf(sighting) * J_pose;
+      J_pose = ScaleOf(observation) * J_pose;
       const double weight = keep * keep;
       normal.H.noalias() += weight * J_pose.transpose() * J_pose;
       normal.g.noalias() += weight * J_pose.transpose() * residual;
@@ -190,7 +191,7 @@ class Resection {
   }
 
   const Camera& camera_;
-  const std::vector<PointSighting>& sightings_;
+  const std::vector<PointObservation2D3D>& observations_;
   const ResectionStart& start_;
   const ResectionOptions& options_;
   std::optional<Eigen::Matrix3d> prior_information_;
@@ -222,7 +223,7 @@ std::optional<std::string> ResectionOptions::Problem() const {
 }
 
 std::optional<ResectedPose> ResectFrame(const Camera& camera,
-                                        const std::vector<PointSighting>& sightings,
+                                        const std::vector<PointObservation2D3D>& observations,
                                         const ResectionStart& start,
                                         const ResectionOptions& options) {
   const auto refuse = [](const std::string& reason) {
@@ -236,11 +237,11 @@ std::optional<ResectedPose> ResectFrame(const Camera& camera,
     refuse("the rotation covariance is not positive definite");
   }
 
-  std::vector<PointSighting> finite;
-  for (const PointSighting& sighting : sightings) {
-    if (sighting.point_in_world.allFinite() && sighting.keypoint_px.allFinite() &&
-        std::isfinite(sighting.sigma_px) && sighting.sigma_px > 0.0) {
-      finite.push_back(sighting);
+  std::vector<PointObservation2D3D> finite;
+  for (const PointObservation2D3D& observation : observations) {
+    if (observation.point_in_world.allFinite() && observation.keypoint_px.allFinite() &&
+        std::isfinite(observation.sigma_px) && observation.sigma_px > 0.0) {
+      finite.push_back(observation);
     }
   }
   if (static_cast<int>(finite.size()) < options.min_inliers) return std::nullopt;
@@ -266,10 +267,10 @@ std::optional<ResectedPose> ResectFrame(const Camera& camera,
   result.cam_from_world = pose.cam_from_world;
   result.center_in_world = pose.center_in_world;
   double squares = 0.0;
-  for (const PointSighting& sighting : finite) {
-    if (!resection.IsInlier(pose, sighting)) continue;
+  for (const PointObservation2D3D& observation : finite) {
+    if (!resection.IsInlier(pose, observation)) continue;
     ++result.num_inliers;
-    const double error_px = resection.Sigmas(pose, sighting) * sighting.sigma_px;
+    const double error_px = resection.Sigmas(pose, observation) * observation.sigma_px;
     squares += error_px * error_px;
   }
   if (result.num_inliers < options.min_inliers) return std::nullopt;

@@ -7,12 +7,14 @@
 #include <Eigen/Core>
 
 #include "rotodom/camera/camera.h"
+#include "rotodom/types/ids.h"
 #include "rotodom/types/rotation.h"
 
 namespace rotslam {
 
-/// A known point and where one image shows it.
-struct PointSighting {
+/// A known point and the keypoint at which one image shows it.
+struct PointObservation2D3D {
+  TrackId track;  // of the point
   Eigen::Vector3d point_in_world;
   Eigen::Vector2d keypoint_px;
   double sigma_px = 1.0;  // standard deviation of the keypoint, per image axis
@@ -35,13 +37,13 @@ struct ResectionOptions {
   // frame inside a pure rotation.
   bool refine_rotation = true;
   bool refine_center = true;
-  // Whether sightings are less certain along their blurs. Bundle adjustment finds out.
+  // Whether observations are less certain along their blurs. Bundle adjustment finds out.
   bool has_motion_blur = false;
   // Residual, in sigmas, around which Geman-McClure's weight 1 / (1 + r^2 / scale^2)^2 falls off.
   // The scale comes down to it from the median residual at the start, halving each time.
   double loss_scale = 3.0;
-  // Sightings farther than this from their point are not inliers. For keypoints with sigma_px above
-  // 1 it grows with sigma_px.
+  // Observations farther than this from their point are not inliers. For keypoints with sigma_px
+  // above 1 it grows with sigma_px.
   double max_error_px = 3.0;
   // Fewer inliers are no pose.
   int min_inliers = 10;
@@ -71,17 +73,17 @@ struct ResectedPose {
 
 /// Pose of one frame against known points: robust least squares on six unknowns, from a start that
 /// is about right (a frame between keyframes, its rotation known and its centre interpolated).
-/// @param sightings  those with numbers that are not finite are ignored.
+/// @param observations  those with numbers that are not finite are ignored.
 /// @return  nullopt with too few inliers, or when they leave the pose open or did not settle.
 /// Throws std::invalid_argument for bad options, camera or start.
-/// Error:   truth to 1e-9 of the distance to the points on clean sightings; with 30 % outliers as
-/// good as without them (ba tests).
-/// Cost:    about 30 passes over the sightings, some more where the rotation is a measurement; one
+/// Error:   truth to 1e-9 of the distance to the points on clean observations; with 30 % outliers
+/// as good as without them (ba tests). Cost:    about 30 passes over the observations, some more
+/// where the rotation is a measurement; one
 ///          or two milliseconds for 1,000.
 /// Source:  iteratively reweighted least squares with a falling scale, as in Barron, A General and
 ///          Adaptive Robust Loss Function, CVPR 2019, sec. 3; ours is Levenberg-Marquardt inside.
 std::optional<ResectedPose> ResectFrame(const Camera& camera,
-                                        const std::vector<PointSighting>& sightings,
+                                        const std::vector<PointObservation2D3D>& observations,
                                         const ResectionStart& start,
                                         const ResectionOptions& options);
 

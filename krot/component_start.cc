@@ -82,7 +82,7 @@ std::vector<Block> FittingBlocks(const RotationMap& cam_from_world,
   for (const Track& track : tracks) {
     std::vector<int> observations;
     const auto point = TriangulateRobustly(
-        PlacedSightings(cam_from_world, centers, track, /*focal_px=*/1.0, &observations),
+        PosedRays(cam_from_world, centers, track, /*focal_px=*/1.0, &observations),
         units.lp_parallax_rad,
         units.loose_rad);
     if (!point) continue;

@@ -67,14 +67,14 @@ TriangulatedTracks TriangulateAll(const RotationMap& cam_from_world,
   TriangulatedTracks points(tracks.size());
   ParallelFor(static_cast<int>(tracks.size()), options.num_threads, [&](int t) {
     std::vector<int> observations;
-    const std::vector<Sighting> sightings =
-        PlacedSightings(cam_from_world, centers, tracks[t], units.focal_px, &observations);
+    const std::vector<PosedRay> rays =
+        PosedRays(cam_from_world, centers, tracks[t], units.focal_px, &observations);
     const auto robust =
-        TriangulateRobustly(sightings, units.point_angle_rad, options.loose_factor * thresholds[t]);
+        TriangulateRobustly(rays, units.point_angle_rad, options.loose_factor * thresholds[t]);
     if (!robust) return;
     TriangulatedTrack point{robust->point_in_world, {}};
     std::size_t next = 0;
-    for (int k = 0; k < static_cast<int>(sightings.size()); ++k) {
+    for (int k = 0; k < static_cast<int>(rays.size()); ++k) {
       if (next < robust->inliers.size() && robust->inliers[next] == k) {
         ++next;
       } else {

@@ -25,12 +25,12 @@ constexpr int kMaxTrackHypotheses = 20;
 constexpr int kMaxSteps = 10;
 constexpr double kLeastGain = 1e-4;
 
-Sighting AsSighting(const BundleState& state, const Sight& sight, double focal_px) {
-  const FrameState& frame = state.frames[sight.frame];
+PosedRay AsPosedRay(const BundleState& state, const ObservationState& one, double focal_px) {
+  const FrameState& frame = state.frames[one.frame];
   return {frame.cam_from_world,
           state.centers[frame.center],
-          sight.bearing,
-          sight.observation->sigma_px / focal_px};
+          one.bearing,
+          one.observation->sigma_px / focal_px};
 }
 
 // Measures tracks against what the frames, standing where they stand, have seen of them.
@@ -44,29 +44,28 @@ class Measure {
 
   // Reprojection error; nullopt where the camera cannot see the position.
   std::optional<Eigen::Vector2d> ErrorPx(const TrackState& track,
-                                         const Sight& sight,
+                                         const ObservationState& one,
                                          const Eigen::Vector3d& position) const {
     const Eigen::Vector3d offset =
-        track.one_place ? position : position - state_.centers[state_.frames[sight.frame].center];
-    const std::optional<Eigen::Vector2d> pixel =
-        state_.camera.Project(R_c_w_[sight.frame] * offset);
+        track.one_place ? position : position - state_.centers[state_.frames[one.frame].center];
+    const std::optional<Eigen::Vector2d> pixel = state_.camera.Project(R_c_w_[one.frame] * offset);
     if (!pixel) return std::nullopt;
-    return *pixel - sight.observation->keypoint_px;
+    return *pixel - one.observation->keypoint_px;
   }
 
   // Length of an error, in sigmas.
-  double Residual(const Sight& sight, const Eigen::Vector2d& error_px) const {
-    if (!state_.has_motion_blur) return error_px.norm() / sight.observation->sigma_px;
-    return (ScaleOf(state_, sight) * error_px).norm();
+  double Residual(const ObservationState& one, const Eigen::Vector2d& error_px) const {
+    if (!state_.has_motion_blur) return error_px.norm() / one.observation->sigma_px;
+    return (ScaleOf(state_, one) * error_px).norm();
   }
 
   // Of a track where it stands, in sigmas; infinite where the camera cannot see it.
-  double Residual(const TrackState& track, const Sight& sight) const {
-    const auto error_px = ErrorPx(track, sight, track.position);
-    return error_px ? Residual(sight, *error_px) : kInfinity;
+  double Residual(const TrackState& track, const ObservationState& one) const {
+    const auto error_px = ErrorPx(track, one, track.position);
+    return error_px ? Residual(one, *error_px) : kInfinity;
   }
 
-  const Eigen::Matrix3d& RotationOf(const Sight& sight) const { return R_c_w_[sight.frame]; }
+  const Eigen::Matrix3d& RotationOf(const ObservationState& one) const { return R_c_w_[one.frame]; }
 
  private:
   const BundleState& state_;
@@ -107,7 +106,7 @@ class Classifier {
     }
     track.has_position = best.position.has_value();
     if (best.position) track.position = *best.position;
-    best.verdict.fits.resize(track.sights.size(), false);
+    best.verdict.fits.resize(track.observations.size(), false);
     Accept(track, best.verdict.fits);
   }
 
@@ -121,16 +120,16 @@ class Classifier {
   void Accept(TrackState& track, const std::vector<bool>& fits) const {
     int count = 0;
     for (std::size_t k = 0; k < fits.size(); ++k) {
-      Sight& sight = track.sights[k];
-      sight.used = fits[k] && !state_.frames[sight.frame].weak;
-      count += sight.used ? 1 : 0;
+      ObservationState& one = track.observations[k];
+      one.used = fits[k] && !state_.frames[one.frame].weak;
+      count += one.used ? 1 : 0;
     }
     const bool enough = count >= kMinTrackObservations && (track.one_place || IsDeep(track));
     track.kind = !enough           ? TrackKind::kOut
                  : track.one_place ? TrackKind::kDirection
                                    : TrackKind::kPoint;
     if (enough) return;
-    for (Sight& sight : track.sights) sight.used = false;
+    for (ObservationState& one : track.observations) one.used = false;
   }
 
  private:
@@ -148,17 +147,17 @@ class Classifier {
     Verdict verdict = Judge(track, *position, best.verdict.score);
     if (best.position && !(verdict.score < best.verdict.score)) return;
     best.position = position;
-    best.num_misfits = static_cast<int>(track.sights.size()) - verdict.num_fits;
+    best.num_misfits = static_cast<int>(track.observations.size()) - verdict.num_fits;
     best.verdict = std::move(verdict);
   }
 
   // From all observations, from pairs, and from those that fit.
   void Search(const TrackState& track, Best& best) const {
-    const int num_sights = static_cast<int>(track.sights.size());
-    Offer(track, Locate(track, std::vector<bool>(num_sights, true)), best);
+    const int num_observations = static_cast<int>(track.observations.size());
+    Offer(track, Locate(track, std::vector<bool>(num_observations, true)), best);
     if (best.num_misfits == 0 || (max_error_px_ == 0.0 && best.position)) return;
-    for (const auto& [a, b] : Pairs(num_sights)) {
-      std::vector<bool> chosen(num_sights, false);
+    for (const auto& [a, b] : Pairs(num_observations)) {
+      std::vector<bool> chosen(num_observations, false);
       chosen[a] = chosen[b] = true;
       Offer(track, Locate(track, chosen), best);
       if (best.num_misfits == 0) break;
@@ -178,15 +177,15 @@ class Classifier {
   }
 
   // Of the residual, in sigmas.
-  double LimitOf(const Sight& sight) const {
+  double LimitOf(const ObservationState& one) const {
     const double limit = max_residual_ > 0.0 ? max_residual_ : max_error_px_;
     if (limit == 0.0) return std::numeric_limits<double>::max();
-    return limit * std::max(1.0, 1.0 / sight.observation->sigma_px);
+    return limit * std::max(1.0, 1.0 / one.observation->sigma_px);
   }
 
-  bool IsNear(const Sight& sight, const Eigen::Vector2d& error_px) const {
+  bool IsNear(const ObservationState& one, const Eigen::Vector2d& error_px) const {
     return max_error_px_ == 0.0 ||
-           error_px.norm() <= max_error_px_ * std::max(1.0, sight.observation->sigma_px);
+           error_px.norm() <= max_error_px_ * std::max(1.0, one.observation->sigma_px);
   }
 
   // Where the score comes to more than `score_limit`, it and the rest are of the first observations
@@ -195,14 +194,14 @@ class Classifier {
                 const Eigen::Vector3d& position,
                 double score_limit = kInfinity) const {
     Verdict verdict;
-    verdict.fits.reserve(track.sights.size());
+    verdict.fits.reserve(track.observations.size());
     verdict.score = 0.0;
-    for (const Sight& sight : track.sights) {
+    for (const ObservationState& one : track.observations) {
       if (verdict.score > score_limit) break;
-      const auto error_px = measure_.ErrorPx(track, sight, position);
-      const double limit = LimitOf(sight);
-      const double residual = error_px ? measure_.Residual(sight, *error_px) : kInfinity;
-      const bool fits = residual <= limit && IsNear(sight, *error_px);
+      const auto error_px = measure_.ErrorPx(track, one, position);
+      const double limit = LimitOf(one);
+      const double residual = error_px ? measure_.Residual(one, *error_px) : kInfinity;
+      const bool fits = residual <= limit && IsNear(one, *error_px);
       verdict.fits.push_back(fits);
       verdict.num_fits += fits ? 1 : 0;
       const double sigmas = fits ? residual : limit;
@@ -227,22 +226,22 @@ class Classifier {
       Eigen::Vector3d sum = Eigen::Vector3d::Zero();
       for (std::size_t k = 0; k < chosen.size(); ++k) {
         if (!chosen[k]) continue;
-        const Observation& observation = *track.sights[k].observation;
-        sum += state_.frames[track.sights[k].frame].cam_from_world.Inverse() *
-               track.sights[k].bearing / (observation.sigma_px * observation.sigma_px);
+        const Observation& observation = *track.observations[k].observation;
+        sum += state_.frames[track.observations[k].frame].cam_from_world.Inverse() *
+               track.observations[k].bearing / (observation.sigma_px * observation.sigma_px);
       }
       if (!(sum.norm() > 0.0)) return std::nullopt;
       return sum.normalized();
     }
-    std::vector<Sighting> sightings;
-    sightings.reserve(chosen.size());
+    std::vector<PosedRay> rays;
+    rays.reserve(chosen.size());
     for (std::size_t k = 0; k < chosen.size(); ++k) {
       if (chosen[k]) {
-        sightings.push_back(AsSighting(state_, track.sights[k], state_.camera.MeanFocal()));
+        rays.push_back(AsPosedRay(state_, track.observations[k], state_.camera.MeanFocal()));
       }
     }
-    if (sightings.size() < 2) return std::nullopt;
-    return Triangulate(sightings, min_angle_rad_);
+    if (rays.size() < 2) return std::nullopt;
+    return Triangulate(rays, min_angle_rad_);
   }
 
   // A Gauss-Newton step towards the smallest cost of the chosen observations.
@@ -253,17 +252,17 @@ class Classifier {
     Eigen::Vector3d g = Eigen::Vector3d::Zero();
     for (std::size_t k = 0; k < chosen.size(); ++k) {
       if (!chosen[k]) continue;
-      const Sight& sight = track.sights[k];
+      const ObservationState& one = track.observations[k];
       ReprojectionJacobian J;
       const std::optional<Eigen::Vector2d> pixel =
           Reproject(state_.camera,
-                    measure_.RotationOf(sight),
-                    state_.centers[state_.frames[sight.frame].center],
+                    measure_.RotationOf(one),
+                    state_.centers[state_.frames[one.frame].center],
                     position,
                     &J);
       if (!pixel) continue;
-      const Eigen::Matrix2d scale = ScaleOf(state_, sight);
-      const Eigen::Vector2d residual = scale * (*pixel - sight.observation->keypoint_px);
+      const Eigen::Matrix2d scale = ScaleOf(state_, one);
+      const Eigen::Vector2d residual = scale * (*pixel - one.observation->keypoint_px);
       const double weight = Loss(residual.squaredNorm())[1];
       const Eigen::Matrix<double, 2, 3> J_point = scale * J.by_point;
       H.noalias() += weight * J_point.transpose() * J_point;
@@ -274,11 +273,11 @@ class Classifier {
     return position - factor.solve(g);
   }
 
-  // Pairs of sights, widest apart first.
-  static std::vector<std::pair<int, int>> Pairs(int num_sights) {
+  // Pairs of observations, widest apart first.
+  static std::vector<std::pair<int, int>> Pairs(int num_observations) {
     std::vector<std::pair<int, int>> pairs;
-    for (int gap = num_sights - 1; gap > 0; --gap) {
-      for (int a = 0; a + gap < num_sights; ++a) {
+    for (int gap = num_observations - 1; gap > 0; --gap) {
+      for (int a = 0; a + gap < num_observations; ++a) {
         pairs.emplace_back(a, a + gap);
         if (static_cast<int>(pairs.size()) == kMaxTrackHypotheses) return pairs;
       }
@@ -289,10 +288,10 @@ class Classifier {
   // Whether two of the used rays meet at the smallest angle allowed.
   bool IsDeep(const TrackState& track) const {
     std::vector<Eigen::Vector3d> rays;
-    for (const Sight& sight : track.sights) {
-      if (!sight.used) continue;
+    for (const ObservationState& one : track.observations) {
+      if (!one.used) continue;
       rays.push_back(
-          (track.position - state_.centers[state_.frames[sight.frame].center]).normalized());
+          (track.position - state_.centers[state_.frames[one.frame].center]).normalized());
     }
     for (std::size_t b = rays.size(); b-- > 0;) {
       for (std::size_t a = 0; a < b; ++a) {
@@ -318,7 +317,7 @@ void RemoveWeakFrames(const Classifier& classifier, int min_observations, Bundle
   for (bool changed = true; changed;) {
     std::vector<int> count(state.frames.size(), 0);
     for (const TrackState& track : state.tracks) {
-      for (const Sight& sight : track.sights) count[sight.frame] += sight.used ? 1 : 0;
+      for (const ObservationState& one : track.observations) count[one.frame] += one.used ? 1 : 0;
     }
     changed = false;
     for (std::size_t k = 0; k < state.frames.size(); ++k) {
@@ -331,19 +330,19 @@ void RemoveWeakFrames(const Classifier& classifier, int min_observations, Bundle
     for (TrackState& track : state.tracks) {
       if (track.kind == TrackKind::kOut) continue;
       std::vector<bool> fits;
-      for (const Sight& sight : track.sights) fits.push_back(sight.used);
+      for (const ObservationState& one : track.observations) fits.push_back(one.used);
       classifier.Accept(track, fits);
     }
   }
 }
 
-// Calls visit(track, sight) for what points and directions are made of.
+// Calls visit(track, one) for what points and directions are made of.
 template <class Visit>
-void ForEachUsedSight(const BundleState& state, const Visit& visit) {
+void ForEachUsedObservation(const BundleState& state, const Visit& visit) {
   for (const TrackState& track : state.tracks) {
     if (track.kind == TrackKind::kOut) continue;
-    for (const Sight& sight : track.sights) {
-      if (sight.used) visit(track, sight);
+    for (const ObservationState& one : track.observations) {
+      if (one.used) visit(track, one);
     }
   }
 }
@@ -372,8 +371,8 @@ void ClassifyAll(const BundleRound& round,
 double ResidualSpread(const BundleState& state) {
   const Measure measure(state);
   std::vector<double> residuals;
-  ForEachUsedSight(state, [&](const TrackState& track, const Sight& sight) {
-    residuals.push_back(measure.Residual(track, sight));
+  ForEachUsedObservation(state, [&](const TrackState& track, const ObservationState& one) {
+    residuals.push_back(measure.Residual(track, one));
   });
   if (residuals.empty()) return 0.0;
   std::size_t num_free = 0;
@@ -393,19 +392,19 @@ bool ShowsMotionBlur(const BundleState& state) {
   constexpr double kLeastEvidence = 0.015;
   // Shorter ones say nothing.
   constexpr double kLeastBlur = 0.05;
-  constexpr int kLeastSights = 200;
+  constexpr int kMinObservations = 200;
   const Measure measure(state);
   int count = 0;
   double plain_sum = 0.0;
   double sharp_sum = 0.0;
   double sum_of_logs = 0.0;
-  ForEachUsedSight(state, [&](const TrackState& track, const Sight& sight) {
-    const Eigen::Vector2d blur = sight.observation->blur.cast<double>();
+  ForEachUsedObservation(state, [&](const TrackState& track, const ObservationState& one) {
+    const Eigen::Vector2d blur = one.observation->blur.cast<double>();
     const double length = blur.norm();
     if (!(length > kLeastBlur)) return;
-    const auto error_px = measure.ErrorPx(track, sight, track.position);
+    const auto error_px = measure.ErrorPx(track, one, track.position);
     if (!error_px) return;
-    const Eigen::Vector2d residual = *error_px / sight.observation->sigma_px;
+    const Eigen::Vector2d residual = *error_px / one.observation->sigma_px;
     const double along = std::abs(residual.dot(blur)) / length;
     const double across = std::abs(residual.x() * blur.y() - residual.y() * blur.x()) / length;
     const double longer = std::hypot(1.0, length);
@@ -414,7 +413,7 @@ bool ShowsMotionBlur(const BundleState& state) {
     sharp_sum += along / longer + across;
     sum_of_logs += std::log(longer);
   });
-  if (count < kLeastSights || !(plain_sum > 0.0)) return false;
+  if (count < kMinObservations || !(plain_sum > 0.0)) return false;
   // Two coordinates each, of the mean that is most likely.
   return -sum_of_logs / count - 2.0 * std::log(sharp_sum / plain_sum) > kLeastEvidence;
 }
@@ -427,11 +426,11 @@ BundleSupport SupportWithin(const BundleRound& round,
   const Measure measure(state);
   std::vector<bool> frame_sees(state.frames.size(), false);
   BundleSupport support;
-  ForEachUsedSight(state, [&](const TrackState& track, const Sight& sight) {
+  ForEachUsedObservation(state, [&](const TrackState& track, const ObservationState& one) {
     if (track.kind != TrackKind::kPoint) return;
     ++support.num_observations;
-    frame_sees[sight.frame] = true;
-    const double sigmas = measure.Residual(track, sight);
+    frame_sees[one.frame] = true;
+    const double sigmas = measure.Residual(track, one);
     double rho[3] = {sigmas * sigmas, 1.0, 0.0};
     if (loss) loss->Evaluate(sigmas * sigmas, rho);
     support.cost += 0.5 * rho[0];
@@ -447,9 +446,9 @@ BundleSupport SupportWithin(const BundleRound& round,
 ResidualStatistics Statistics(const BundleState& state) {
   const Measure measure(state);
   std::vector<double> errors_px;
-  ForEachUsedSight(state, [&](const TrackState& track, const Sight& sight) {
+  ForEachUsedObservation(state, [&](const TrackState& track, const ObservationState& one) {
     if (track.kind != TrackKind::kPoint) return;
-    const auto error_px = measure.ErrorPx(track, sight, track.position);
+    const auto error_px = measure.ErrorPx(track, one, track.position);
     errors_px.push_back(error_px ? error_px->norm() : kInfinity);
   });
   ResidualStatistics statistics;

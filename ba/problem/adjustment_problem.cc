@@ -64,8 +64,8 @@ void AdjustmentProblem::AddResiduals() {
     // With rotations held a direction has nothing to say.
     if (track.kind == TrackKind::kOut) continue;
     if (track.kind == TrackKind::kDirection && !refine_rotations_) continue;
-    for (const Sight& sight : track.sights) {
-      if (sight.used) AddObservation(track, strays_.Shift(k), sight);
+    for (const ObservationState& one : track.observations) {
+      if (one.used) AddObservation(track, strays_.Shift(k), one);
     }
     ordering_->AddElementToGroup(track.position.data(), 0);
     (track.kind == TrackKind::kPoint ? counts_.num_points : counts_.num_directions) += 1;
@@ -83,29 +83,29 @@ void AdjustmentProblem::AddResiduals() {
 
 void AdjustmentProblem::AddObservation(TrackState& track,
                                        const PointShift& shift,
-                                       const Sight& sight) {
-  const FrameState& frame = state_.frames[sight.frame];
-  const Observation& observation = *sight.observation;
+                                       const ObservationState& one) {
+  const FrameState& frame = state_.frames[one.frame];
+  const Observation& observation = *one.observation;
   ObservationForm form;
   form.camera = cameras_.layout();
   form.at_infinity = track.kind == TrackKind::kDirection;
   form.moves_lens = refine_lens_;
   costs_.emplace_back(cameras_.camera(),
                       calibrated_,
-                      cameras_.RotationOf(sight.frame),
+                      cameras_.RotationOf(one.frame),
                       shift,
                       observation.keypoint_px,
-                      ScaleOf(state_, sight),
+                      ScaleOf(state_, one),
                       huber_bend_,
                       form);
   std::array<double*, 4> blocks;
   int num_blocks = 0;
-  if (refine_rotations_) blocks[num_blocks++] = cameras_.Turn(sight.frame);
+  if (refine_rotations_) blocks[num_blocks++] = cameras_.Turn(one.frame);
   if (!JointPoses() && !form.at_infinity) blocks[num_blocks++] = cameras_.Center(frame.center);
   blocks[num_blocks++] = track.position.data();
   if (form.moves_lens) blocks[num_blocks++] = cameras_.Lens();
   problem_.AddResidualBlock(&costs_.back(), loss_.get(), blocks.data(), num_blocks);
-  frame_used_[sight.frame] = true;
+  frame_used_[one.frame] = true;
   if (!form.at_infinity) center_used_[frame.center] = true;
   if (!frame.fixed) moving_ = true;
   ++counts_.num_observations;

@@ -92,7 +92,7 @@ class AdjustmentProblem {
  private:
   bool JointPoses() const { return cameras_.layout() == CameraLayout::kPose; }
   void AddResiduals();
-  void AddObservation(TrackState& track, const PointShift& shift, const Sight& sight);
+  void AddObservation(TrackState& track, const PointShift& shift, const ObservationState& one);
   void FreeLens(const LensOptions& options);
   void FixGauge();
   void HoldTurn(std::size_t frame);

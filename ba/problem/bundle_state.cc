@@ -100,12 +100,12 @@ void SetTrack(const Track& track,
               const BundleState& state,
               TrackState& entry) {
   entry.track = &track;
-  entry.sights.clear();
+  entry.observations.clear();
   std::set<int> places;
   for (const Observation& observation : track.observations) {
     const auto frame = frame_index.find(observation.frame);
     if (frame == frame_index.end()) continue;
-    entry.sights.push_back({&observation, observation.bearing, frame->second, false});
+    entry.observations.push_back({&observation, observation.bearing, frame->second, false});
     places.insert(state.frames[frame->second].center);
   }
   entry.one_place = places.size() <= 1;
@@ -154,8 +154,8 @@ void ReplaceTracks(std::vector<Track> tracks, int num_threads, BundleState& stat
   SetCamera(state.camera, num_threads, state);
 }
 
-Eigen::Matrix2d ScaleOf(const BundleState& state, const Sight& sight) {
-  const Observation& observation = *sight.observation;
+Eigen::Matrix2d ScaleOf(const BundleState& state, const ObservationState& one) {
+  const Observation& observation = *one.observation;
   if (!state.has_motion_blur) return Eigen::Matrix2d::Identity() / observation.sigma_px;
   return Deblurring(observation.blur) / observation.sigma_px;
 }
@@ -163,9 +163,9 @@ Eigen::Matrix2d ScaleOf(const BundleState& state, const Sight& sight) {
 void SetCamera(const Camera& camera, int num_threads, BundleState& state) {
   state.camera = camera;
   ParallelFor(static_cast<int>(state.tracks.size()), num_threads, [&](int k) {
-    for (Sight& sight : state.tracks[k].sights) {
-      const auto bearing = camera.Unproject(sight.observation->keypoint_px);
-      if (bearing) sight.bearing = *bearing;
+    for (ObservationState& one : state.tracks[k].observations) {
+      const auto bearing = camera.Unproject(one.observation->keypoint_px);
+      if (bearing) one.bearing = *bearing;
     }
   });
 }

@@ -27,7 +27,7 @@ struct FrameState {
 enum class TrackKind { kOut, kPoint, kDirection };
 
 // An observation in a frame that has a pose.
-struct Sight {
+struct ObservationState {
   const Observation* observation = nullptr;
   Eigen::Vector3d bearing;  // of the keypoint, as the lens stands
   int frame = 0;
@@ -36,8 +36,8 @@ struct Sight {
 
 struct TrackState {
   const Track* track = nullptr;
-  std::vector<Sight> sights;
-  bool one_place = false;  // all sights from one centre: a direction, no depth
+  std::vector<ObservationState> observations;
+  bool one_place = false;  // all observations from one centre: a direction, no depth
   TrackKind kind = TrackKind::kOut;
   bool has_position = false;
   Eigen::Vector3d position;  // point in the world, or direction when seen from one place
@@ -63,7 +63,7 @@ BundleState MakeBundleState(const BundleProblem& problem, const BundleOptions& o
 void ReplaceTracks(std::vector<Track> tracks, int num_threads, BundleState& state);
 
 /// Sigmas per pixel: the inverse root of the keypoint's covariance.
-Eigen::Matrix2d ScaleOf(const BundleState& state, const Sight& sight);
+Eigen::Matrix2d ScaleOf(const BundleState& state, const ObservationState& one);
 
 /// Replaces the camera, and the bearings with it.
 void SetCamera(const Camera& camera, int num_threads, BundleState& state);

@@ -44,11 +44,11 @@ void StrayPoints::Accept() {
 // Of the bearings: a lens is not needed to tell what is far out.
 double StrayPoints::ErrorPx(const TrackState& track, const Eigen::Vector3d& position) const {
   double sum = 0.0;
-  for (const Sight& sight : track.sights) {
-    if (!sight.used) continue;
-    const Pose& pose = poses_[sight.frame];
+  for (const ObservationState& one : track.observations) {
+    if (!one.used) continue;
+    const Pose& pose = poses_[one.frame];
     const Eigen::Vector3d seen = pose.R_c_w * (position - pose.center);
-    sum += (seen.normalized() - sight.bearing).norm();
+    sum += (seen.normalized() - one.bearing).norm();
   }
   return state_.camera.MeanFocal() * sum;
 }
@@ -61,7 +61,7 @@ void StrayPoints::Follow(std::size_t k) {
   const double limit_px = accepted_errors_px_[k] + kUnseenResidual_px;
   if (errors_px_[k] <= limit_px) return;
   Offer(k, CarriedAlong(k));
-  if (const auto position = Triangulate(Sightings(track), min_angle_rad_)) Offer(k, *position);
+  if (const auto position = Triangulate(RaysOf(track), min_angle_rad_)) Offer(k, *position);
   shifts_[k].lost = !CheaperSeen(k);
 }
 
@@ -71,13 +71,13 @@ bool StrayPoints::CheaperSeen(std::size_t k) const {
   const TrackState& track = state_.tracks[k];
   double sum = 0.0;
   double unseen = accepted_errors_px_[k];
-  for (const Sight& sight : track.sights) {
-    if (!sight.used) continue;
-    const Pose& pose = poses_[sight.frame];
+  for (const ObservationState& one : track.observations) {
+    if (!one.used) continue;
+    const Pose& pose = poses_[one.frame];
     const std::optional<Eigen::Vector2d> pixel =
         state_.camera.Project(pose.R_c_w * (positions_[k] - pose.center));
     unseen += kUnseenResidual_px;
-    sum += pixel ? (*pixel - sight.observation->keypoint_px).norm() : kUnseenResidual_px;
+    sum += pixel ? (*pixel - one.observation->keypoint_px).norm() : kUnseenResidual_px;
   }
   return sum < unseen;
 }
@@ -96,25 +96,23 @@ void StrayPoints::Offer(std::size_t k, const Eigen::Vector3d& position) {
 Eigen::Vector3d StrayPoints::CarriedAlong(std::size_t k) const {
   Eigen::Vector3d sum = Eigen::Vector3d::Zero();
   int count = 0;
-  for (const Sight& sight : state_.tracks[k].sights) {
-    if (!sight.used) continue;
-    sum += poses_[sight.frame].center - accepted_poses_[sight.frame].center;
+  for (const ObservationState& one : state_.tracks[k].observations) {
+    if (!one.used) continue;
+    sum += poses_[one.frame].center - accepted_poses_[one.frame].center;
     ++count;
   }
   return accepted_positions_[k] + sum / count;
 }
 
-std::vector<Sighting> StrayPoints::Sightings(const TrackState& track) const {
-  std::vector<Sighting> sightings;
-  for (const Sight& sight : track.sights) {
-    if (!sight.used) continue;
-    const Pose& pose = poses_[sight.frame];
-    sightings.push_back({Rotation::FromMatrix(pose.R_c_w),
-                         pose.center,
-                         sight.bearing,
-                         sight.observation->sigma_px});
+std::vector<PosedRay> StrayPoints::RaysOf(const TrackState& track) const {
+  std::vector<PosedRay> rays;
+  for (const ObservationState& one : track.observations) {
+    if (!one.used) continue;
+    const Pose& pose = poses_[one.frame];
+    rays.push_back(
+        {Rotation::FromMatrix(pose.R_c_w), pose.center, one.bearing, one.observation->sigma_px});
   }
-  return sightings;
+  return rays;
 }
 
 void StrayPoints::ForEachPoint(const std::function<void(std::size_t)>& work) const {

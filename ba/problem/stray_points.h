@@ -12,7 +12,7 @@
 namespace rotslam {
 
 /// Points while cameras and points move together. A step that is right for nearly all of them
-/// throws a few out of sight, those with little parallax behind the cameras above all, and is
+/// throws a few out of one, those with little parallax behind the cameras above all, and is
 /// refused for what these few cost; short steps that spare them hardly get on. Here such points are
 /// put where the cameras' new poses see them, before the step is judged.
 ///
@@ -51,7 +51,7 @@ class StrayPoints {
   void Follow(std::size_t track);
   void Offer(std::size_t track, const Eigen::Vector3d& position);
   Eigen::Vector3d CarriedAlong(std::size_t track) const;
-  std::vector<Sighting> Sightings(const TrackState& track) const;
+  std::vector<PosedRay> RaysOf(const TrackState& track) const;
   void ForEachPoint(const std::function<void(std::size_t)>& work) const;
 
   const BundleState& state_;

@@ -30,19 +30,19 @@ MinimaxStructure Restrict(const MinimaxStructure& structure, const std::vector<i
   return restricted;
 }
 
-std::vector<PointObservation> SightsOf(const MinimaxProblem& problem,
-                                       const PointGroups& groups,
-                                       const MinimaxStructure& structure,
-                                       int point) {
-  std::vector<PointObservation> sights;
-  sights.reserve(groups.begin[point + 1] - groups.begin[point]);
+std::vector<AffineProjection> ProjectionsOf(const MinimaxProblem& problem,
+                                            const PointGroups& groups,
+                                            const MinimaxStructure& structure,
+                                            int point) {
+  std::vector<AffineProjection> projections;
+  projections.reserve(groups.begin[point + 1] - groups.begin[point]);
   for (int k = groups.begin[point]; k < groups.begin[point + 1]; ++k) {
     const ImageObservation& observation = problem.observations[groups.observations[k]];
-    sights.push_back(SightOfPoint(problem.R_c_w[observation.view],
-                                  structure.center_in_world[observation.view],
-                                  observation.xy));
+    projections.push_back(ProjectionOfPoint(problem.R_c_w[observation.view],
+                                            structure.center_in_world[observation.view],
+                                            observation.xy));
   }
-  return sights;
+  return projections;
 }
 
 // What takes `from` nearest to `to`; one where that is no positive number.
@@ -131,7 +131,7 @@ class Search {
   void TakeStart(const MinimaxStructure& start) {
     structure_ = start;
     for (int i = 0; i < problem_.num_points; ++i) {
-      if (MaxPointResidual(SightsOf(problem_, groups_, structure_, i),
+      if (MaxPointResidual(ProjectionsOf(problem_, groups_, structure_, i),
                            structure_.point_in_world[i]) == kInfinity) {
         Triangulate(i, 0.0);
       }
@@ -330,10 +330,11 @@ class Search {
   void Triangulate(double limit) {
     std::vector<bool> exact = chosen_;
     for (int i = 0; i < problem_.num_points; ++i) {
-      const std::vector<PointObservation> sights = SightsOf(problem_, groups_, structure_, i);
-      residuals_[i] = MaxPointResidual(sights, structure_.point_in_world[i]);
+      const std::vector<AffineProjection> projections =
+          ProjectionsOf(problem_, groups_, structure_, i);
+      residuals_[i] = MaxPointResidual(projections, structure_.point_in_world[i]);
       if (chosen_[i] || residuals_[i] <= limit) continue;
-      Move(i, sights, LeastSquaresPoint(sights));
+      Move(i, projections, LeastSquaresPoint(projections));
       if (residuals_[i] == kInfinity) Triangulate(i, limit);
     }
     constexpr int kMaxRounds = 4;
@@ -359,12 +360,17 @@ class Search {
     MinimaxPointOptions point_options;
     point_options.relative_gap = 0.1;
     point_options.good_enough = good_enough;
-    const std::vector<PointObservation> sights = SightsOf(problem_, groups_, structure_, i);
-    Move(i, sights, FindMinimaxPoint(sights, structure_.point_in_world[i], point_options).position);
+    const std::vector<AffineProjection> projections =
+        ProjectionsOf(problem_, groups_, structure_, i);
+    Move(i,
+         projections,
+         FindMinimaxPoint(projections, structure_.point_in_world[i], point_options).position);
   }
 
-  void Move(int i, const std::vector<PointObservation>& sights, const Eigen::Vector3d& position) {
-    const double residual = MaxPointResidual(sights, position);
+  void Move(int i,
+            const std::vector<AffineProjection>& projections,
+            const Eigen::Vector3d& position) {
+    const double residual = MaxPointResidual(projections, position);
     if (!(residual < residuals_[i])) return;
     residuals_[i] = residual;
     structure_.point_in_world[i] = position;

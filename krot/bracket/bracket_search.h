@@ -37,7 +37,7 @@ Bracket BisectPrograms(const MinimaxProblem& problem,
                        const SearchLimits& limits,
                        const MinimaxStructure* start);
 
-/// The same where all observations are of one view: a point lies in the middle of its sights.
+/// The same where all observations are of one view: a point lies in the middle of its rays.
 Bracket SearchSingleView(const MinimaxProblem& problem, const BisectionOptions& options);
 
 /// The bracket is as narrow as asked, or too low to matter.

@@ -19,13 +19,6 @@ struct EpipolarFilterOptions {
   std::uint64_t seed = 1;
 };
 
-/// An observation, by its indices in the list of tracks.
-struct ObservationIndex {
-  int track = 0;
-  int observation = 0;
-  auto operator<=>(const ObservationIndex&) const = default;
-};
-
 /// The result of the epipolar test.
 struct EpipolarVerdict {
   // Observations that contradict the known rotations: they fail the test in more pairs than they

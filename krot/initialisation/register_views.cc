@@ -22,7 +22,7 @@ class Registration {
     for (int t = 0; t < static_cast<int>(tracks.size()); ++t) {
       for (int o = 0; o < static_cast<int>(tracks[t].observations.size()); ++o) {
         const FrameId frame = tracks[t].observations[o].frame;
-        sights_of_[frame].push_back({t, o});
+        observations_of_[frame].push_back({t, o});
         if (centers_.contains(frame)) ++num_registered_[t];
       }
       if (num_registered_[t] >= 2) Intersect(t);
@@ -30,20 +30,21 @@ class Registration {
   }
 
   int NumKnownPoints(FrameId view) const {
-    const auto entry = sights_of_.find(view);
-    if (entry == sights_of_.end()) return 0;
+    const auto entry = observations_of_.find(view);
+    if (entry == observations_of_.end()) return 0;
     int count = 0;
-    for (const Sight& sight : entry->second) count += points_[sight.track].has_value();
+    for (const ObservationIndex& seen : entry->second) count += points_[seen.track].has_value();
     return count;
   }
 
   bool Register(FrameId view) {
     const Rotation world_from_cam = cam_from_world_.at(view).Inverse();
-    std::vector<RayToPoint> rays;
-    for (const Sight& sight : sights_of_.at(view)) {
-      if (!points_[sight.track]) continue;
-      const Observation& observation = tracks_[sight.track].observations[sight.observation];
-      rays.push_back({*points_[sight.track], world_from_cam * observation.bearing});
+    // Resection of a centre is triangulation along the reversed rays from the known points.
+    std::vector<PosedRay> rays;
+    for (const ObservationIndex& seen : observations_of_.at(view)) {
+      if (!points_[seen.track]) continue;
+      const Observation& observation = tracks_[seen.track].observations[seen.observation];
+      rays.push_back({Rotation(), *points_[seen.track], -(world_from_cam * observation.bearing)});
     }
     CenterResectionOptions resection_options = options_.resection;
     resection_options.seed += static_cast<std::uint64_t>(view.value) * 7919u;
@@ -52,28 +53,22 @@ class Registration {
       return false;
     }
     centers_[view] = resection->center_in_world;
-    for (const Sight& sight : sights_of_.at(view)) {
-      const int placed = ++num_registered_[sight.track];
+    for (const ObservationIndex& seen : observations_of_.at(view)) {
+      const int placed = ++num_registered_[seen.track];
       if (placed < 2) continue;
       // Known points are triangulated again after every new view up to four, then at powers of two
       // and multiples of twelve.
-      if (!points_[sight.track] || placed <= 4 || (placed & (placed - 1)) == 0 ||
-          placed % 12 == 0) {
-        Intersect(sight.track);
+      if (!points_[seen.track] || placed <= 4 || (placed & (placed - 1)) == 0 || placed % 12 == 0) {
+        Intersect(seen.track);
       }
     }
     return true;
   }
 
  private:
-  struct Sight {
-    int track;
-    int observation;
-  };
-
   void Intersect(int track) {
     const auto point =
-        TriangulateRobustly(PlacedSightings(cam_from_world_, centers_, tracks_[track], 1.0),
+        TriangulateRobustly(PosedRays(cam_from_world_, centers_, tracks_[track], 1.0),
                             options_.min_angle_rad,
                             options_.threshold_rad);
     if (point) points_[track] = point->point_in_world;
@@ -85,7 +80,7 @@ class Registration {
   CenterMap& centers_;
   std::vector<std::optional<Eigen::Vector3d>> points_;
   std::vector<int> num_registered_;
-  std::map<FrameId, std::vector<Sight>> sights_of_;
+  std::map<FrameId, std::vector<ObservationIndex>> observations_of_;
 };
 
 // The first view in order with five times min_points known points, else the one with the most, at
@@ -110,22 +105,22 @@ std::optional<std::size_t> NextView(const Registration& registration,
 
 }  // namespace
 
-std::vector<Sighting> PlacedSightings(const RotationMap& cam_from_world,
-                                      const CenterMap& centers,
-                                      const Track& track,
-                                      double focal_px,
-                                      std::vector<int>* observations) {
-  std::vector<Sighting> sightings;
+std::vector<PosedRay> PosedRays(const RotationMap& cam_from_world,
+                                const CenterMap& centers,
+                                const Track& track,
+                                double focal_px,
+                                std::vector<int>* observations) {
+  std::vector<PosedRay> rays;
   for (std::size_t o = 0; o < track.observations.size(); ++o) {
     const Observation& observation = track.observations[o];
     const auto center = centers.find(observation.frame);
     if (center == centers.end()) continue;
     const double sigma = observation.sigma_px > 0.0 ? observation.sigma_px / focal_px : 1.0;
-    sightings.push_back(
+    rays.push_back(
         {cam_from_world.at(observation.frame), center->second, observation.bearing, sigma});
     if (observations != nullptr) observations->push_back(static_cast<int>(o));
   }
-  return sightings;
+  return rays;
 }
 
 std::vector<FrameId> RegisterViews(const RotationMap& cam_from_world,

@@ -31,12 +31,12 @@ std::vector<FrameId> RegisterViews(const RotationMap& cam_from_world,
                                    const RegistrationOptions& options,
                                    CenterMap& centers);
 
-/// Sightings of a track by views with a centre. If `observations` is not null, it receives their
+/// Rays of a track by views with a centre. If `observations` is not null, it receives their
 /// indices in the track.
-std::vector<Sighting> PlacedSightings(const RotationMap& cam_from_world,
-                                      const CenterMap& centers,
-                                      const Track& track,
-                                      double focal_px,
-                                      std::vector<int>* observations = nullptr);
+std::vector<PosedRay> PosedRays(const RotationMap& cam_from_world,
+                                const CenterMap& centers,
+                                const Track& track,
+                                double focal_px,
+                                std::vector<int>* observations = nullptr);
 
 }  // namespace rotslam

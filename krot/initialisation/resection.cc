@@ -3,60 +3,48 @@
 #include <algorithm>
 #include <cmath>
 
-#include <Eigen/Dense>
-
 #include "rotodom/types/splitmix64.h"
-#include "rotodom/types/triangulation.h"
 
 namespace rotslam {
 namespace {
 
-// Resection of a centre is triangulation of a point along the reversed rays from the known points.
-Sighting Reversed(const RayToPoint& ray, double sigma) {
-  return {Rotation(), ray.point_in_world, -ray.ray_in_world, sigma};
-}
-
-double RayError(const RayToPoint& ray, const Eigen::Vector3d& center) {
-  const Eigen::Vector3d offset = ray.point_in_world - center;
-  return std::atan2(offset.cross(ray.ray_in_world).norm(), offset.dot(ray.ray_in_world));
-}
-
-std::vector<int> Inliers(const std::vector<RayToPoint>& rays,
+std::vector<int> Inliers(const std::vector<PosedRay>& rays,
                          const Eigen::Vector3d& center,
                          double threshold) {
   std::vector<int> inliers;
   for (std::size_t k = 0; k < rays.size(); ++k) {
-    if (RayError(rays[k], center) <= threshold) inliers.push_back(static_cast<int>(k));
+    if (BearingError(rays[k], center) <= threshold) inliers.push_back(static_cast<int>(k));
   }
   return inliers;
 }
 
 // Point half-way between two lines; nullopt when they are parallel.
-std::optional<Eigen::Vector3d> Midpoint(const RayToPoint& a, const RayToPoint& b) {
-  const double cosine = a.ray_in_world.dot(b.ray_in_world);
+std::optional<Eigen::Vector3d> Midpoint(const PosedRay& a, const PosedRay& b) {
+  const Eigen::Vector3d along_a = a.cam_from_world.Inverse() * a.bearing;
+  const Eigen::Vector3d along_b = b.cam_from_world.Inverse() * b.bearing;
+  const double cosine = along_a.dot(along_b);
   const double sine_squared = 1.0 - cosine * cosine;
   if (sine_squared < 1e-6) return std::nullopt;
-  const Eigen::Vector3d w = b.point_in_world - a.point_in_world;
-  const double along_a = w.dot(a.ray_in_world);
-  const double along_b = w.dot(b.ray_in_world);
-  const double s = (along_a - cosine * along_b) / sine_squared;
-  const double t = (cosine * along_a - along_b) / sine_squared;
-  return 0.5 * (a.point_in_world + s * a.ray_in_world + b.point_in_world + t * b.ray_in_world);
+  const Eigen::Vector3d w = b.center_in_world - a.center_in_world;
+  const double s = (w.dot(along_a) - cosine * w.dot(along_b)) / sine_squared;
+  const double t = (cosine * w.dot(along_a) - w.dot(along_b)) / sine_squared;
+  return 0.5 * (a.center_in_world + s * along_a + b.center_in_world + t * along_b);
 }
 
 // Re-weighted least squares of angles.
-std::optional<Eigen::Vector3d> Refine(const std::vector<RayToPoint>& rays,
+std::optional<Eigen::Vector3d> Refine(const std::vector<PosedRay>& rays,
                                       const std::vector<int>& inliers,
                                       Eigen::Vector3d center,
                                       double threshold) {
   const double scale = std::max(0.3 * threshold, 1e-12);
   for (int round = 0; round < 4; ++round) {
-    std::vector<Sighting> sightings;
+    std::vector<PosedRay> weighted;
     for (const int k : inliers) {
-      const double error = RayError(rays[k], center) / scale;
-      sightings.push_back(Reversed(rays[k], std::sqrt(1.0 + error * error)));
+      const double error = BearingError(rays[k], center) / scale;
+      weighted.push_back(rays[k]);
+      weighted.back().sigma = std::sqrt(1.0 + error * error);
     }
-    const auto refined = Triangulate(sightings, 1e-6);
+    const auto refined = Triangulate(weighted, 1e-6);
     if (!refined) return round == 0 ? std::nullopt : std::optional(center);
     center = *refined;
   }
@@ -65,7 +53,7 @@ std::optional<Eigen::Vector3d> Refine(const std::vector<RayToPoint>& rays,
 
 }  // namespace
 
-std::optional<Resection> ResectCenter(const std::vector<RayToPoint>& rays,
+std::optional<Resection> ResectCenter(const std::vector<PosedRay>& rays,
                                       const CenterResectionOptions& options) {
   const int count = static_cast<int>(rays.size());
   if (count < 3) return std::nullopt;

@@ -6,13 +6,9 @@
 
 #include <Eigen/Core>
 
-namespace rotslam {
+#include "rotodom/types/triangulation.h"
 
-/// A known point and the ray to it from the unknown centre.
-struct RayToPoint {
-  Eigen::Vector3d point_in_world;
-  Eigen::Vector3d ray_in_world;  // unit, from the unknown centre
-};
+namespace rotslam {
 
 // The name differs from ba's ResectionOptions, since both are in namespace rotslam.
 /// Options for the resection of a camera centre.
@@ -30,9 +26,11 @@ struct Resection {
 /// Camera centre from known points and a known rotation. The centre lies on the line through each
 /// point along its ray: d x (X - c) = 0, linear in c. Hypotheses come from random pairs of lines
 /// and are scored by all lines; the best is refined by robust least squares of angles.
+/// @param rays  from the known points, which stand as their centres, back to the unknown centre.
+///              Their sigmas are ignored.
 /// @return  nullopt when fewer than three lines agree or they do not determine the centre.
 /// Error:   exact on exact input (1e-9 of the scene's size).
-std::optional<Resection> ResectCenter(const std::vector<RayToPoint>& rays,
+std::optional<Resection> ResectCenter(const std::vector<PosedRay>& rays,
                                       const CenterResectionOptions& options);
 
 }  // namespace rotslam

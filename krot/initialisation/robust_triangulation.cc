@@ -5,40 +5,40 @@
 namespace rotslam {
 namespace {
 
-std::vector<int> Agreeing(const std::vector<Sighting>& sightings,
+std::vector<int> Agreeing(const std::vector<PosedRay>& rays,
                           const Eigen::Vector3d& point,
                           double threshold_rad) {
   std::vector<int> inliers;
-  for (std::size_t k = 0; k < sightings.size(); ++k) {
-    if (BearingError(sightings[k], point) <= threshold_rad) inliers.push_back(static_cast<int>(k));
+  for (std::size_t k = 0; k < rays.size(); ++k) {
+    if (BearingError(rays[k], point) <= threshold_rad) inliers.push_back(static_cast<int>(k));
   }
   return inliers;
 }
 
-std::vector<Sighting> Pick(const std::vector<Sighting>& sightings, const std::vector<int>& chosen) {
-  std::vector<Sighting> picked;
+std::vector<PosedRay> Pick(const std::vector<PosedRay>& rays, const std::vector<int>& chosen) {
+  std::vector<PosedRay> picked;
   picked.reserve(chosen.size());
-  for (const int k : chosen) picked.push_back(sightings[k]);
+  for (const int k : chosen) picked.push_back(rays[k]);
   return picked;
 }
 
 }  // namespace
 
-std::optional<RobustPoint> TriangulateRobustly(const std::vector<Sighting>& sightings,
+std::optional<RobustPoint> TriangulateRobustly(const std::vector<PosedRay>& rays,
                                                double min_angle_rad,
                                                double threshold_rad) {
-  const int count = static_cast<int>(sightings.size());
+  const int count = static_cast<int>(rays.size());
   if (count < 2) return std::nullopt;
-  if (const auto point = Triangulate(sightings, min_angle_rad)) {
-    std::vector<int> inliers = Agreeing(sightings, *point, threshold_rad);
+  if (const auto point = Triangulate(rays, min_angle_rad)) {
+    std::vector<int> inliers = Agreeing(rays, *point, threshold_rad);
     if (static_cast<int>(inliers.size()) == count) return RobustPoint{*point, std::move(inliers)};
   }
   if (count < 3) return std::nullopt;
   std::vector<int> best;
   const auto propose = [&](int a, int b) {
-    const auto point = Triangulate({sightings[a], sightings[b]}, 0.5 * min_angle_rad);
+    const auto point = Triangulate({rays[a], rays[b]}, 0.5 * min_angle_rad);
     if (!point) return;
-    std::vector<int> inliers = Agreeing(sightings, *point, threshold_rad);
+    std::vector<int> inliers = Agreeing(rays, *point, threshold_rad);
     if (inliers.size() > best.size()) best = std::move(inliers);
   };
   propose(0, count - 1);
@@ -58,11 +58,11 @@ std::optional<RobustPoint> TriangulateRobustly(const std::vector<Sighting>& sigh
     }
   }
   if (2 * static_cast<int>(best.size()) <= count || best.size() < 2) return std::nullopt;
-  const auto refitted = Triangulate(Pick(sightings, best), min_angle_rad);
+  const auto refitted = Triangulate(Pick(rays, best), min_angle_rad);
   if (!refitted) return std::nullopt;
-  best = Agreeing(sightings, *refitted, threshold_rad);
+  best = Agreeing(rays, *refitted, threshold_rad);
   if (2 * static_cast<int>(best.size()) <= count || best.size() < 2) return std::nullopt;
-  const std::vector<Sighting> kept = Pick(sightings, best);
+  const std::vector<PosedRay> kept = Pick(rays, best);
   if (TriangulationAngle(kept, *refitted) < min_angle_rad) return std::nullopt;
   return RobustPoint{*refitted, std::move(best)};
 }

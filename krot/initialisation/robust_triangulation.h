@@ -10,14 +10,14 @@ namespace rotslam {
 /// A triangulated point and its inliers.
 struct RobustPoint {
   Eigen::Vector3d point_in_world;
-  std::vector<int> inliers;  // positions in the sightings, ascending
+  std::vector<int> inliers;  // positions in the rays, ascending
 };
 
-/// Triangulates a point from sightings with outliers: from all of them first, then from pairs. The
+/// Triangulates a point from rays with outliers: from all of them first, then from pairs. The
 /// hypothesis with the most inliers is refined on these.
-/// @return  nullopt when fewer than two sightings agree to `threshold_rad` in front of their
+/// @return  nullopt when fewer than two rays agree to `threshold_rad` in front of their
 ///          cameras with at least `min_angle_rad` of parallax, or when they are not the majority.
-std::optional<RobustPoint> TriangulateRobustly(const std::vector<Sighting>& sightings,
+std::optional<RobustPoint> TriangulateRobustly(const std::vector<PosedRay>& rays,
                                                double min_angle_rad,
                                                double threshold_rad);
 

@@ -23,33 +23,33 @@ constexpr double kFarthest = 10.0;
 // where depths are still to be made positive.
 class PointProgram {
  public:
-  PointProgram(std::span<const PointObservation> observations,
+  PointProgram(std::span<const AffineProjection> projections,
                double gamma,
                std::vector<double> depths,
                bool slack_on_depth)
-      : observations_(observations),
+      : projections_(projections),
         gamma_(gamma),
         depths_(std::move(depths)),
         slack_on_depth_(slack_on_depth) {}
 
-  int size() const { return static_cast<int>(observations_.size()); }
+  int size() const { return static_cast<int>(projections_.size()); }
 
   Six Sigma(int o) const {
     const double d = depths_[o];
     return {d, d, d, d, slack_on_depth_ ? d : 0.0, 0.0};
   }
   // a_k . u
-  Six Apply(int o, const Eigen::Vector3d& u) const { return Rows(observations_[o].A * u); }
+  Six Apply(int o, const Eigen::Vector3d& u) const { return Rows(projections_[o].A * u); }
   // b_k
   Six Right(int o) const {
-    Six right = -Rows(observations_[o].b);
+    Six right = -Rows(projections_[o].b);
     right[4] -= kNearest * depths_[o];
     right[5] += kFarthest * depths_[o];
     return right;
   }
   // sum y_k a_k
   Eigen::Vector3d Transposed(int o, const Six& y) const {
-    return observations_[o].A.transpose() *
+    return projections_[o].A.transpose() *
            Eigen::Vector3d(
                y[0] - y[1], y[2] - y[3], -gamma_ * (y[0] + y[1] + y[2] + y[3]) - y[4] + y[5]);
   }
@@ -61,7 +61,7 @@ class PointProgram {
     const double yz = gamma_ * (D[3] - D[2]);
     Eigen::Matrix3d weight;
     weight << x, 0.0, xz, 0.0, y, yz, xz, yz, gamma_ * gamma_ * (x + y) + D[4] + D[5];
-    return observations_[o].A.transpose() * weight * observations_[o].A;
+    return projections_[o].A.transpose() * weight * projections_[o].A;
   }
 
  private:
@@ -70,7 +70,7 @@ class PointProgram {
     return {m.x() - margin, -m.x() - margin, m.y() - margin, -m.y() - margin, -m.z(), m.z()};
   }
 
-  std::span<const PointObservation> observations_;
+  std::span<const AffineProjection> projections_;
   double gamma_;
   std::vector<double> depths_;
   bool slack_on_depth_;
@@ -167,7 +167,7 @@ bool NewtonStep(const PointProgram& program, PointIterate& at) {
 
 // True when the multipliers prove that no |u| <= extent has all residuals at most gamma: the rows
 // say a_k . u <= b_k, so sum y a = e and sum y b < -extent |e| cannot both be.
-bool Proves(std::span<const PointObservation> observations,
+bool Proves(std::span<const AffineProjection> projections,
             double gamma,
             const Sixes& multipliers,
             double extent) {
@@ -176,41 +176,41 @@ bool Proves(std::span<const PointObservation> observations,
   double absolute = 0.0;
   double right = 0.0;
   double absolute_right = 0.0;
-  for (std::size_t o = 0; o < observations.size(); ++o) {
+  for (std::size_t o = 0; o < projections.size(); ++o) {
     const Six y = multipliers[o].max(0.0);
     const Eigen::Vector3d weights(
         y[0] - y[1], y[2] - y[3], -gamma * (y[0] + y[1] + y[2] + y[3]) - y[4]);
     const double size = y[0] + y[1] + y[2] + y[3] + y[4];
-    sum += observations[o].A.transpose() * weights;
-    absolute += size * (1.0 + gamma) * observations[o].A.cwiseAbs().maxCoeff();
-    right -= observations[o].b.dot(weights);
-    absolute_right += size * (1.0 + gamma) * observations[o].b.cwiseAbs().maxCoeff();
+    sum += projections[o].A.transpose() * weights;
+    absolute += size * (1.0 + gamma) * projections[o].A.cwiseAbs().maxCoeff();
+    right -= projections[o].b.dot(weights);
+    absolute_right += size * (1.0 + gamma) * projections[o].b.cwiseAbs().maxCoeff();
   }
-  const double terms = 8.0 * (static_cast<double>(observations.size()) + 8.0);
+  const double terms = 8.0 * (static_cast<double>(projections.size()) + 8.0);
   const double imbalance = sum.lpNorm<1>() + 3.0 * terms * kEpsilon * absolute;
   return right + extent * imbalance + 3.0 * terms * kEpsilon * absolute_right < 0.0;
 }
 
-double LeastDepth(std::span<const PointObservation> observations, const Eigen::Vector3d& u) {
+double LeastDepth(std::span<const AffineProjection> projections, const Eigen::Vector3d& u) {
   double least = kInfinity;
-  for (const PointObservation& observation : observations) {
-    least = std::min(least, observation.A.row(2).dot(u) + observation.b.z());
+  for (const AffineProjection& projection : projections) {
+    least = std::min(least, projection.A.row(2).dot(u) + projection.b.z());
   }
   return least;
 }
 
 class PointSearch {
  public:
-  PointSearch(std::span<const PointObservation> observations, const MinimaxPointOptions& options)
-      : observations_(observations), options_(options) {
-    for (const PointObservation& observation : observations) {
-      scale_ = std::max(scale_, observation.b.cwiseAbs().maxCoeff());
+  PointSearch(std::span<const AffineProjection> projections, const MinimaxPointOptions& options)
+      : projections_(projections), options_(options) {
+    for (const AffineProjection& projection : projections) {
+      scale_ = std::max(scale_, projection.b.cwiseAbs().maxCoeff());
     }
   }
 
   MinimaxPoint Run(const Eigen::Vector3d& start) {
     Offer(start);
-    if (!Done()) Offer(LeastSquaresPoint(observations_));
+    if (!Done()) Offer(LeastSquaresPoint(projections_));
     if (best_.gamma_high == kInfinity) MakeDepthsPositive(start);
     if (best_.gamma_high == kInfinity) return best_;
     double gamma = 0.9 * best_.gamma_high;
@@ -225,7 +225,7 @@ class PointSearch {
   }
 
   void Offer(const Eigen::Vector3d& u) {
-    const double residual = MaxPointResidual(observations_, u);
+    const double residual = MaxPointResidual(projections_, u);
     if (residual >= best_.gamma_high) return;
     best_.gamma_high = residual;
     best_.position = u;
@@ -234,11 +234,11 @@ class PointSearch {
   // Solves the program at `gamma` around the best position. Returns the next gamma.
   double Improve(double gamma) {
     std::vector<double> depths;
-    depths.reserve(observations_.size());
-    for (const PointObservation& observation : observations_) {
-      depths.push_back(observation.A.row(2).dot(best_.position) + observation.b.z());
+    depths.reserve(projections_.size());
+    for (const AffineProjection& projection : projections_) {
+      depths.push_back(projection.A.row(2).dot(best_.position) + projection.b.z());
     }
-    const PointProgram program(observations_, gamma, std::move(depths), false);
+    const PointProgram program(projections_, gamma, std::move(depths), false);
     PointIterate at = Start(program, best_.position, 0.3 * best_.gamma_high);
     constexpr int kMaxSteps = 40;
     for (int step = 0; step < kMaxSteps; ++step) {
@@ -260,7 +260,7 @@ class PointSearch {
 
   // Proves() after up to kMaxRepairs weighted least-squares steps towards sum y a = 0.
   bool ProvesRepaired(double gamma, Sixes y) const {
-    const PointProgram program(observations_, gamma, {}, false);
+    const PointProgram program(projections_, gamma, {}, false);
     for (Six& of_row : y) of_row[5] = 0.0;
     constexpr int kMaxRepairs = 6;
     for (int round = 0; round < kMaxRepairs; ++round) {
@@ -275,7 +275,7 @@ class PointSearch {
       for (int o = 0; o < program.size(); ++o) {
         y[o] = (y[o] * (1.0 - program.Apply(o, lambda))).max(0.0);
       }
-      if (Proves(observations_, gamma, y, options_.max_extent * scale_)) return true;
+      if (Proves(projections_, gamma, y, options_.max_extent * scale_)) return true;
     }
     return false;
   }
@@ -283,18 +283,18 @@ class PointSearch {
   void MakeDepthsPositive(const Eigen::Vector3d& start) {
     constexpr int kMaxSteps = 40;
     for (const double gamma : {1.0, 10.0, 100.0}) {
-      const std::vector<double> depths(observations_.size(), std::max(1e-6, scale_));
-      const PointProgram program(observations_, gamma, depths, true);
+      const std::vector<double> depths(projections_.size(), std::max(1e-6, scale_));
+      const PointProgram program(projections_, gamma, depths, true);
       PointIterate at = Start(program, start.allFinite() ? start : Eigen::Vector3d::Zero(), 1.0);
       for (int step = 0; step < kMaxSteps && NewtonStep(program, at); ++step) {
-        if (LeastDepth(observations_, at.u) > 0.0) break;
+        if (LeastDepth(projections_, at.u) > 0.0) break;
       }
       Offer(at.u);
       if (best_.gamma_high < kInfinity) return;
     }
   }
 
-  std::span<const PointObservation> observations_;
+  std::span<const AffineProjection> projections_;
   MinimaxPointOptions options_;
   double scale_ = 0.0;
   int num_unproven_ = 0;
@@ -303,30 +303,30 @@ class PointSearch {
 
 }  // namespace
 
-PointObservation SightOfPoint(const Eigen::Matrix3d& R_c_w,
-                              const Eigen::Vector3d& center_in_world,
-                              const Eigen::Vector2d& xy) {
-  PointObservation observation;
-  observation.A = R_c_w;
-  observation.A.topRows<2>() -= xy * R_c_w.row(2);
-  observation.b = -observation.A * center_in_world;
-  return observation;
+AffineProjection ProjectionOfPoint(const Eigen::Matrix3d& R_c_w,
+                                   const Eigen::Vector3d& center_in_world,
+                                   const Eigen::Vector2d& xy) {
+  AffineProjection projection;
+  projection.A = R_c_w;
+  projection.A.topRows<2>() -= xy * R_c_w.row(2);
+  projection.b = -projection.A * center_in_world;
+  return projection;
 }
 
-PointObservation SightFromCenter(const Eigen::Matrix3d& R_c_w,
-                                 const Eigen::Vector3d& point_in_world,
-                                 const Eigen::Vector2d& xy) {
-  PointObservation observation = SightOfPoint(R_c_w, point_in_world, xy);
-  observation.A = -observation.A;
-  observation.b = -observation.b;
-  return observation;
+AffineProjection ProjectionFromCenter(const Eigen::Matrix3d& R_c_w,
+                                      const Eigen::Vector3d& point_in_world,
+                                      const Eigen::Vector2d& xy) {
+  AffineProjection projection = ProjectionOfPoint(R_c_w, point_in_world, xy);
+  projection.A = -projection.A;
+  projection.b = -projection.b;
+  return projection;
 }
 
-double MaxPointResidual(std::span<const PointObservation> observations,
+double MaxPointResidual(std::span<const AffineProjection> projections,
                         const Eigen::Vector3d& position) {
   double largest = 0.0;
-  for (const PointObservation& observation : observations) {
-    const Eigen::Vector3d m = observation.A * position + observation.b;
+  for (const AffineProjection& projection : projections) {
+    const Eigen::Vector3d m = projection.A * position + projection.b;
     if (!(m.z() > 0.0)) return kInfinity;
     const double residual = m.head<2>().cwiseAbs().maxCoeff() / m.z();
     if (!(residual < kInfinity)) return kInfinity;
@@ -335,22 +335,22 @@ double MaxPointResidual(std::span<const PointObservation> observations,
   return largest;
 }
 
-Eigen::Vector3d LeastSquaresPoint(std::span<const PointObservation> observations) {
+Eigen::Vector3d LeastSquaresPoint(std::span<const AffineProjection> projections) {
   Eigen::Matrix3d H = Eigen::Matrix3d::Zero();
   Eigen::Vector3d g = Eigen::Vector3d::Zero();
-  for (const PointObservation& observation : observations) {
-    const auto rows = observation.A.topRows<2>();
+  for (const AffineProjection& projection : projections) {
+    const auto rows = projection.A.topRows<2>();
     H += rows.transpose() * rows;
-    g -= rows.transpose() * observation.b.head<2>();
+    g -= rows.transpose() * projection.b.head<2>();
   }
   H.diagonal().array() += 1e-12 * H.trace();
   return H.ldlt().solve(g);
 }
 
-MinimaxPoint FindMinimaxPoint(std::span<const PointObservation> observations,
+MinimaxPoint FindMinimaxPoint(std::span<const AffineProjection> projections,
                               const Eigen::Vector3d& start,
                               const MinimaxPointOptions& options) {
-  return PointSearch(observations, options).Run(start);
+  return PointSearch(projections, options).Run(start);
 }
 
 }  // namespace rotslam

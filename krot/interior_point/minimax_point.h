@@ -8,21 +8,22 @@
 
 namespace rotslam {
 
-/// One observation of a single unknown u, a point or a centre. (A u + b) is (x, y, depth): the
-/// difference of the projection from the measurement, times depth, and the depth.
-struct PointObservation {
+/// How the residual of one observation depends on a single unknown u, a point or a centre. (A u +
+/// b) is (x, y, depth): the difference of the projection from the measurement, times depth, and the
+/// depth.
+struct AffineProjection {
   Eigen::Matrix3d A;
   Eigen::Vector3d b;
 };
 
-/// Observation of an unknown point u from a known centre and rotation.
-PointObservation SightOfPoint(const Eigen::Matrix3d& R_c_w,
-                              const Eigen::Vector3d& center_in_world,
-                              const Eigen::Vector2d& xy);
-/// Observation of a known point from an unknown centre u with known rotation.
-PointObservation SightFromCenter(const Eigen::Matrix3d& R_c_w,
-                                 const Eigen::Vector3d& point_in_world,
-                                 const Eigen::Vector2d& xy);
+/// Of an unknown point u, from a known centre and rotation.
+AffineProjection ProjectionOfPoint(const Eigen::Matrix3d& R_c_w,
+                                   const Eigen::Vector3d& center_in_world,
+                                   const Eigen::Vector2d& xy);
+/// Of a known point, from an unknown centre u with known rotation.
+AffineProjection ProjectionFromCenter(const Eigen::Matrix3d& R_c_w,
+                                      const Eigen::Vector3d& point_in_world,
+                                      const Eigen::Vector2d& xy);
 
 /// How closely the least largest residual of one point is bracketed.
 struct MinimaxPointOptions {
@@ -43,13 +44,13 @@ struct MinimaxPoint {
   double gamma_high = kInfinity;  // infinite: no position in front of all cameras was found
 };
 
-/// Maximum of |x| / depth and |y| / depth over all observations; infinity where a depth is not
+/// Maximum of |x| / depth and |y| / depth over all projections; infinity where a depth is not
 /// positive.
-double MaxPointResidual(std::span<const PointObservation> observations,
+double MaxPointResidual(std::span<const AffineProjection> projections,
                         const Eigen::Vector3d& position);
 
 /// Position with the least sum of squares of x and y times depth: the start of the search.
-Eigen::Vector3d LeastSquaresPoint(std::span<const PointObservation> observations);
+Eigen::Vector3d LeastSquaresPoint(std::span<const AffineProjection> projections);
 
 /// L-infinity triangulation and resection with known rotation: the position with the smallest
 /// largest residual per image axis (box norm), with a proven lower bound.
@@ -58,7 +59,7 @@ Eigen::Vector3d LeastSquaresPoint(std::span<const PointObservation> observations
 /// Cost:    some 40 interior-point steps on four unknowns; 0.05 ms for six observations.
 /// Source:  Kahl & Hartley, Multiple-View Geometry under the L-infinity Norm, PAMI 2008; ours
 ///          replaces halving by the step of Crouzeix, Ferland & Schaible.
-MinimaxPoint FindMinimaxPoint(std::span<const PointObservation> observations,
+MinimaxPoint FindMinimaxPoint(std::span<const AffineProjection> projections,
                               const Eigen::Vector3d& start,
                               const MinimaxPointOptions& options = {});
 

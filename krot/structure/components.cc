@@ -17,12 +17,7 @@ double Angle(const Eigen::Vector3d& a, const Eigen::Vector3d& b) {
   return std::atan2(a.cross(b).norm(), a.dot(b));
 }
 
-struct Sight {
-  int track;
-  Eigen::Vector3d ray_in_world;
-};
-
-using SightsOfView = std::map<FrameId, std::vector<Sight>>;
+using RaysOfViews = std::map<FrameId, std::vector<TrackRay>>;
 
 // The pair of remaining views with the most common tracks with parallax between the two; the
 // earliest of equal ones.
@@ -60,35 +55,35 @@ std::optional<std::pair<FrameId, FrameId>> BestPair(const std::vector<Track>& tr
 class Grower {
  public:
   Grower(const std::vector<Track>& tracks,
-         const SightsOfView& sights,
+         const RaysOfViews& rays,
          const std::set<FrameId>& free_views,
          const ComponentOptions& options)
       : tracks_(tracks),
-        sights_(sights),
+        rays_(rays),
         free_views_(free_views),
         options_(options),
-        first_sight_(tracks.size()),
+        first_ray_(tracks.size()),
         known_(tracks.size(), 0.0) {}
 
   void Add(FrameId view) {
     component_.views.push_back(view);
     placed_.insert(view);
     num_known_.erase(view);
-    for (const Sight& sight : sights_.at(view)) {
-      std::optional<FirstSight>& first = first_sight_[sight.track];
+    for (const TrackRay& ray : rays_.at(view)) {
+      std::optional<FirstRay>& first = first_ray_[ray.track];
       if (!first) {
-        first = {view, sight.ray_in_world};
+        first = {view, ray.ray_in_world};
         continue;
       }
-      const double known = Knowledge(*first, view, sight.ray_in_world);
-      if (known <= known_[sight.track]) continue;
-      for (const Observation& observation : tracks_[sight.track].observations) {
+      const double known = Knowledge(*first, view, ray.ray_in_world);
+      if (known <= known_[ray.track]) continue;
+      for (const Observation& observation : tracks_[ray.track].observations) {
         if (placed_.contains(observation.frame) || !free_views_.contains(observation.frame)) {
           continue;
         }
-        num_known_[observation.frame] += known - known_[sight.track];
+        num_known_[observation.frame] += known - known_[ray.track];
       }
-      known_[sight.track] = known;
+      known_[ray.track] = known;
     }
   }
 
@@ -110,13 +105,13 @@ class Grower {
   const ViewComponent& component() const { return component_; }
 
  private:
-  struct FirstSight {
+  struct FirstRay {
     FrameId view;
     Eigen::Vector3d ray_in_world;
   };
 
   // Weight of a point seen by two views, 0 (unknown depth) to 1 (known).
-  double Knowledge(const FirstSight& first, FrameId view, const Eigen::Vector3d& ray) const {
+  double Knowledge(const FirstRay& first, FrameId view, const Eigen::Vector3d& ray) const {
     const double parallax = Angle(first.ray_in_world, ray);
     if (parallax >= options_.min_parallax_rad) return 1.0;
     const double noise = std::max(NoiseOf(first.view), NoiseOf(view));
@@ -132,10 +127,10 @@ class Grower {
   }
 
   const std::vector<Track>& tracks_;
-  const SightsOfView& sights_;
+  const RaysOfViews& rays_;
   const std::set<FrameId>& free_views_;
   const ComponentOptions& options_;
-  std::vector<std::optional<FirstSight>> first_sight_;
+  std::vector<std::optional<FirstRay>> first_ray_;
   std::vector<double> known_;            // weight of each track as a known point
   std::map<FrameId, double> num_known_;  // known points seen by each remaining view
   std::set<FrameId> placed_;
@@ -163,19 +158,12 @@ double TrackParallax(const RotationMap& cam_from_world, const Track& track) {
 std::vector<ViewComponent> FindComponents(const RotationMap& cam_from_world,
                                           const std::vector<Track>& tracks,
                                           const ComponentOptions& options) {
-  SightsOfView sights;
+  const RaysOfViews rays = RaysByFrame(cam_from_world, tracks);
   std::set<FrameId> free_views;
-  for (std::size_t t = 0; t < tracks.size(); ++t) {
-    for (const Observation& observation : tracks[t].observations) {
-      sights[observation.frame].push_back(
-          {static_cast<int>(t),
-           cam_from_world.at(observation.frame).Inverse() * observation.bearing});
-      free_views.insert(observation.frame);
-    }
-  }
+  for (const auto& [view, of_view] : rays) free_views.insert(view);
   std::vector<ViewComponent> components;
   while (const auto seed = BestPair(tracks, cam_from_world, free_views, options)) {
-    Grower grower(tracks, sights, free_views, options);
+    Grower grower(tracks, rays, free_views, options);
     grower.Add(seed->first);
     grower.Add(seed->second);
     while (const auto next = grower.Next()) grower.Add(*next);

@@ -18,27 +18,24 @@ namespace {
 constexpr std::size_t kPairs = 300;
 constexpr std::size_t kMaxMatches = 150;
 constexpr std::size_t kMinMatches = 50;
-struct TimedSight {
-  double after_s = 0.0;
-  Eigen::Vector3d unturned;
-};
 
-TimedSight Unturn(const FrameObservation& sight,
-                  const AngularMotion& motion,
-                  const Readout& readout) {
-  const double after_s = sight.time_s + readout.seconds * sight.place[readout.axis];
-  return {after_s, motion.ToMidFrame(after_s, sight.bearing)};
+// The observation with the known rotation removed.
+TimedBearing Unturn(const FrameObservation& observation,
+                    const AngularMotion& motion,
+                    const Readout& readout) {
+  const double after_s = observation.time_s + readout.seconds * observation.place[readout.axis];
+  return {after_s, motion.ToMidFrame(after_s, observation.bearing)};
 }
 
 Eigen::Vector3d MidFrameBearing(const SeenPoint& point,
                                 const AngularMotion& motion,
                                 const Readout& readout) {
-  const TimedSight here = Unturn(point.here, motion, readout);
-  if (!point.around) return here.unturned;
-  const TimedSight before = Unturn((*point.around)[0], motion, readout);
-  const TimedSight after = Unturn((*point.around)[1], motion, readout);
+  const TimedBearing here = Unturn(point.here, motion, readout);
+  if (!point.around) return here.bearing;
+  const TimedBearing before = Unturn((*point.around)[0], motion, readout);
+  const TimedBearing after = Unturn((*point.around)[1], motion, readout);
   const double share = here.after_s / (after.after_s - before.after_s);
-  return (here.unturned - share * (after.unturned - before.unturned)).normalized();
+  return (here.bearing - share * (after.bearing - before.bearing)).normalized();
 }
 
 using Frames = std::map<FrameId, SeenPoints>;
@@ -154,9 +151,9 @@ class PairMaker {
     return some;
   }
 
-  std::optional<FrameObservation> SightOf(TrackId track,
-                                          const SeenPoints& frame,
-                                          double mid_s) const {
+  std::optional<FrameObservation> ObservationOf(TrackId track,
+                                                const SeenPoints& frame,
+                                                double mid_s) const {
     const int index = FindTrack(frame.tracks, track);
     if (index < 0) return std::nullopt;
     const Eigen::Vector2d& keypoint_px = frame.keypoints_px[index];
@@ -170,11 +167,11 @@ class PairMaker {
   std::optional<SeenPoint> PointOf(TrackId track, FrameId frame) const {
     const auto at = frames_.find(frame);
     const double mid_s = at->second.timestamp_s;
-    const auto here = SightOf(track, at->second, mid_s);
+    const auto here = ObservationOf(track, at->second, mid_s);
     if (!here) return std::nullopt;
     SeenPoint point{*here, std::nullopt};
-    const auto before = SightOf(track, std::prev(at)->second, mid_s);
-    const auto after = SightOf(track, std::next(at)->second, mid_s);
+    const auto before = ObservationOf(track, std::prev(at)->second, mid_s);
+    const auto after = ObservationOf(track, std::next(at)->second, mid_s);
     if (before && after) point.around = {*before, *after};
     return point;
   }

@@ -12,39 +12,21 @@
 namespace rotslam {
 namespace {
 
-struct Ray {
-  int track;
-  Eigen::Vector3d direction;  // in world axes
-};
-
-std::map<FrameId, std::vector<Ray>> RaysOfFrames(const RotationMap& cam_from_world,
-                                                 const std::vector<Track>& tracks) {
-  std::map<FrameId, std::vector<Ray>> rays;
-  for (int k = 0; k < static_cast<int>(tracks.size()); ++k) {
-    for (const Observation& observation : tracks[k].observations) {
-      const auto rotation = cam_from_world.find(observation.frame);
-      if (rotation == cam_from_world.end()) continue;
-      rays[observation.frame].push_back({k, rotation->second.Inverse() * observation.bearing});
-    }
-  }
-  return rays;
-}
-
 struct Overlap {
   double shared_ratio = 0.0;
   double parallax_rad = 0.0;  // median over the shared tracks
 };
 
 // Both sorted by track.
-Overlap Compare(const std::vector<Ray>& keyframe, const std::vector<Ray>& frame) {
+Overlap Compare(const std::vector<TrackRay>& keyframe, const std::vector<TrackRay>& frame) {
   std::vector<double> angles;
   auto other = frame.begin();
-  for (const Ray& ray : keyframe) {
+  for (const TrackRay& ray : keyframe) {
     while (other != frame.end() && other->track < ray.track) ++other;
     if (other == frame.end()) break;
     if (other->track != ray.track) continue;
-    const double sine = ray.direction.cross(other->direction).norm();
-    angles.push_back(std::atan2(sine, ray.direction.dot(other->direction)));
+    const double sine = ray.ray_in_world.cross(other->ray_in_world).norm();
+    angles.push_back(std::atan2(sine, ray.ray_in_world.dot(other->ray_in_world)));
   }
   if (angles.empty()) return {};
   const double overlap = static_cast<double>(angles.size()) / static_cast<double>(keyframe.size());
@@ -52,18 +34,18 @@ Overlap Compare(const std::vector<Ray>& keyframe, const std::vector<Ray>& frame)
 }
 
 // Number of keyframes so far that see each track.
-class Sightings {
+class KeyframeCounts {
  public:
-  explicit Sightings(std::size_t num_tracks) : counts_(num_tracks, 0) {}
+  explicit KeyframeCounts(std::size_t num_tracks) : counts_(num_tracks, 0) {}
 
-  void Add(const std::vector<Ray>& keyframe) {
-    for (const Ray& ray : keyframe) ++counts_[ray.track];
+  void Add(const std::vector<TrackRay>& keyframe) {
+    for (const TrackRay& ray : keyframe) ++counts_[ray.track];
   }
   // Number of a frame's tracks seen by two keyframes: their points have depth and propagate the
   // scale.
-  int NumLinks(const std::vector<Ray>& frame) const {
+  int NumLinks(const std::vector<TrackRay>& frame) const {
     return static_cast<int>(std::count_if(
-        frame.begin(), frame.end(), [&](const Ray& ray) { return counts_[ray.track] >= 2; }));
+        frame.begin(), frame.end(), [&](const TrackRay& ray) { return counts_[ray.track] >= 2; }));
   }
 
  private:
@@ -73,21 +55,21 @@ class Sightings {
 // Selects keyframes in one pass over the frames.
 // @param rays_of  rays of every frame with tracks.
 std::set<FrameId> SelectFrom(const RotationMap& cam_from_world,
-                             const std::map<FrameId, std::vector<Ray>>& rays_of,
+                             const std::map<FrameId, std::vector<TrackRay>>& rays_of,
                              std::size_t num_tracks,
                              const std::vector<PureRotationSegment>& segments,
                              const KeyframeOptions& options) {
   std::set<FrameId> keyframes;
-  Sightings sightings(num_tracks);
-  static const std::vector<Ray> kNoRays;
-  const auto rays = [&](FrameId frame) -> const std::vector<Ray>& {
+  KeyframeCounts counts(num_tracks);
+  static const std::vector<TrackRay> kNoRays;
+  const auto rays = [&](FrameId frame) -> const std::vector<TrackRay>& {
     const auto entry = rays_of.find(frame);
     return entry == rays_of.end() ? kNoRays : entry->second;
   };
   FrameId keyframe = cam_from_world.begin()->first;
   FrameId before = keyframe;  // newest frame that could still become a keyframe
   const auto take = [&](FrameId frame) {
-    if (keyframes.insert(frame).second) sightings.Add(rays(frame));
+    if (keyframes.insert(frame).second) counts.Add(rays(frame));
     keyframe = frame;
   };
   take(keyframe);
@@ -109,7 +91,7 @@ std::set<FrameId> SelectFrom(const RotationMap& cam_from_world,
     Overlap overlap = Compare(rays(keyframe), rays(frame));
     const double least_links =
         options.min_linked_ratio * static_cast<double>(rays(keyframe).size());
-    const bool breaks = keyframes.size() > 1 && sightings.NumLinks(rays(frame)) < least_links;
+    const bool breaks = keyframes.size() > 1 && counts.NumLinks(rays(frame)) < least_links;
     if ((overlap.shared_ratio < options.min_shared_ratio || breaks) && before > keyframe) {
       // This frame shares too few tracks; the frame before becomes the keyframe.
       take(before);
@@ -149,7 +131,7 @@ std::set<FrameId> SelectKeyframes(const RotationMap& cam_from_world,
   if (const auto problem = options.Problem())
     throw std::invalid_argument("KeyframeOptions: " + *problem);
   if (cam_from_world.empty()) return {};
-  const auto rays_of = RaysOfFrames(cam_from_world, tracks);
+  const auto rays_of = RaysByFrame(cam_from_world, tracks);
   constexpr int kMaxHalvings = 4;  // of the parallax, see KeyframeOptions::min_keyframes
   KeyframeOptions asked = options;
   std::set<FrameId> keyframes = SelectFrom(cam_from_world, rays_of, tracks.size(), segments, asked);

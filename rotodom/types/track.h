@@ -1,8 +1,10 @@
 #pragma once
 
 #include <array>
+#include <compare>
 #include <cstdint>
 #include <iterator>
+#include <map>
 #include <set>
 #include <utility>
 #include <vector>
@@ -10,10 +12,11 @@
 #include <Eigen/Core>
 
 #include "rotodom/types/ids.h"
+#include "rotodom/types/maps.h"
 
 namespace rotslam {
 
-/// One sighting of a scene point.
+/// One observation of a scene point in an image.
 struct Observation {
   FrameId frame;
   Eigen::Vector2d
@@ -36,6 +39,24 @@ struct Track {
   std::vector<Observation> observations;
   std::array<std::uint8_t, 3> rgb = {128, 128, 128};
 };
+
+/// An observation, by its indices in a list of tracks.
+struct ObservationIndex {
+  int track = 0;
+  int observation = 0;
+  auto operator<=>(const ObservationIndex&) const = default;
+};
+
+/// The ray of a track from the camera that sees it.
+struct TrackRay {
+  int track = 0;                 // index in the list of tracks
+  Eigen::Vector3d ray_in_world;  // unit
+};
+
+/// By frame, the rays of the tracks that it sees, in the order of the tracks; frames without a
+/// rotation are absent.
+std::map<FrameId, std::vector<TrackRay>> RaysByFrame(const RotationMap& cam_from_world,
+                                                     const std::vector<Track>& tracks);
 
 /// Restricts the tracks to the observations that fulfil `keep`; tracks with fewer than `min_length`
 /// of them are dropped.

@@ -9,7 +9,7 @@
 namespace rotslam {
 namespace {
 
-ResectionStart NearStart(const SeenPoints& view, double angle_deg, double offset) {
+ResectionStart NearStart(const PointsInView& view, double angle_deg, double offset) {
   ResectionStart start;
   start.cam_from_world =
       Rotation::Exp(angle_deg * kRadFromDeg * Eigen::Vector3d(0.6, -0.64, 0.48)) *
@@ -22,8 +22,8 @@ class ResectionForEveryCamera : public ::testing::TestWithParam<CameraModel> {};
 INSTANTIATE_TEST_SUITE_P(Models, ResectionForEveryCamera, ::testing::ValuesIn(AllCameraModels()));
 
 TEST_P(ResectionForEveryCamera, CleanSightingsGiveTheTruth) {
-  const SeenPoints view = MakeView(GetParam(), 100, 0.0, 0.0);
-  const auto pose = ResectFrame(view.camera, view.sightings, NearStart(view, 2.0, 0.8), {});
+  const PointsInView view = MakeView(GetParam(), 100, 0.0, 0.0);
+  const auto pose = ResectFrame(view.camera, view.observations, NearStart(view, 2.0, 0.8), {});
   ASSERT_TRUE(pose);
   EXPECT_LT(AngleErrorDeg(*pose, view), 1e-8);
   EXPECT_LT((pose->center_in_world - view.center_in_world).norm(), 1e-9 * 20.0);
@@ -31,7 +31,7 @@ TEST_P(ResectionForEveryCamera, CleanSightingsGiveTheTruth) {
 }
 
 // Squared error in units of the covariance: 6 on average, above 22.5 once in a thousand.
-double SquaredMahalanobis(const ResectedPose& pose, const SeenPoints& view) {
+double SquaredMahalanobis(const ResectedPose& pose, const PointsInView& view) {
   Eigen::Matrix<double, 6, 1> error;
   error << (pose.cam_from_world * view.cam_from_world.Inverse()).Log(),
       pose.center_in_world - view.center_in_world;
@@ -40,8 +40,8 @@ double SquaredMahalanobis(const ResectedPose& pose, const SeenPoints& view) {
 
 TEST(ResectFrame, ThirtyPercentOutliersDoNoHarm) {
   for (const double offset : {0.1, 0.5, 2.0}) {
-    const SeenPoints view = MakeView(CameraModel::kPinhole, 500, 0.5, 0.3);
-    const auto pose = ResectFrame(view.camera, view.sightings, NearStart(view, 1.0, offset), {});
+    const PointsInView view = MakeView(CameraModel::kPinhole, 500, 0.5, 0.3);
+    const auto pose = ResectFrame(view.camera, view.observations, NearStart(view, 1.0, offset), {});
     ASSERT_TRUE(pose);
     EXPECT_NEAR(pose->num_inliers, 350, 30);
     EXPECT_LT(SquaredMahalanobis(*pose, view), 22.5);
@@ -50,25 +50,25 @@ TEST(ResectFrame, ThirtyPercentOutliersDoNoHarm) {
 
 TEST(ResectFrame, CovarianceTellsTheErrorToExpect) {
   // Mean of the squared error in its own covariance's unit, over 100 draws of noise: 6 unknowns.
-  SeenPoints view = MakeView(CameraModel::kPinhole, 200, 0.0, 0.0);
-  const std::vector<PointSighting> clean = view.sightings;
+  PointsInView view = MakeView(CameraModel::kPinhole, 200, 0.0, 0.0);
+  const std::vector<PointObservation2D3D> clean = view.observations;
   for (const double blur : {0.0, 3.0}) {
     std::mt19937 random(3);
     std::normal_distribution<double> normal(0.0, 0.5);
     double sum = 0.0;
     for (int draw = 0; draw < 100; ++draw) {
-      view.sightings = clean;
+      view.observations = clean;
       for (std::size_t k = 0; k < clean.size(); ++k) {
-        PointSighting& sighting = view.sightings[k];
+        PointObservation2D3D& observation = view.observations[k];
         const double angle = 0.1 * static_cast<double>(k);
         const Eigen::Vector2d along = blur * Eigen::Vector2d(std::cos(angle), std::sin(angle));
-        sighting.keypoint_px += Eigen::Vector2d(normal(random), normal(random));
-        sighting.keypoint_px += normal(random) * along;
-        sighting.sigma_px = 0.5;
-        sighting.blur = along.cast<float>();
+        observation.keypoint_px += Eigen::Vector2d(normal(random), normal(random));
+        observation.keypoint_px += normal(random) * along;
+        observation.sigma_px = 0.5;
+        observation.blur = along.cast<float>();
       }
       const auto pose = ResectFrame(view.camera,
-                                    view.sightings,
+                                    view.observations,
                                     NearStart(view, 0.5, 0.2),
                                     {.has_motion_blur = true, .loss_scale = 20.0});
       ASSERT_TRUE(pose);
@@ -79,29 +79,30 @@ TEST(ResectFrame, CovarianceTellsTheErrorToExpect) {
 }
 
 TEST(ResectFrame, HoldsWhatItIsToldTo) {
-  const SeenPoints view = MakeView(CameraModel::kPinhole, 100, 0.0, 0.0);
+  const PointsInView view = MakeView(CameraModel::kPinhole, 100, 0.0, 0.0);
   ResectionStart start = NearStart(view, 0.0, 0.8);
-  const auto centred = ResectFrame(view.camera, view.sightings, start, {.refine_rotation = false});
+  const auto centred =
+      ResectFrame(view.camera, view.observations, start, {.refine_rotation = false});
   ASSERT_TRUE(centred);
   EXPECT_EQ(centred->cam_from_world.Quaternion().coeffs(),
             start.cam_from_world.Quaternion().coeffs());
   EXPECT_LT((centred->center_in_world - view.center_in_world).norm(), 1e-8);
   EXPECT_EQ((centred->covariance.topRows<3>().norm()), 0.0);
   start = NearStart(view, 1.0, 0.0);
-  const auto turned = ResectFrame(view.camera, view.sightings, start, {.refine_center = false});
+  const auto turned = ResectFrame(view.camera, view.observations, start, {.refine_center = false});
   ASSERT_TRUE(turned);
   EXPECT_EQ(turned->center_in_world, start.center_in_world);
   EXPECT_LT(AngleErrorDeg(*turned, view), 1e-8);
 }
 
 TEST(ResectFrame, ATightRotationPriorHoldsTheRotation) {
-  const SeenPoints view = MakeView(CameraModel::kPinhole, 200, 0.5, 0.0);
+  const PointsInView view = MakeView(CameraModel::kPinhole, 200, 0.5, 0.0);
   ResectionStart start = NearStart(view, 0.0, 0.3);
-  const auto free = ResectFrame(view.camera, view.sightings, start, {});
+  const auto free = ResectFrame(view.camera, view.observations, start, {});
   start.rotation_covariance = 1e-14 * Eigen::Matrix3d::Identity();
-  const auto tight = ResectFrame(view.camera, view.sightings, start, {});
+  const auto tight = ResectFrame(view.camera, view.observations, start, {});
   start.rotation_covariance = 1e6 * Eigen::Matrix3d::Identity();
-  const auto loose = ResectFrame(view.camera, view.sightings, start, {});
+  const auto loose = ResectFrame(view.camera, view.observations, start, {});
   ASSERT_TRUE(free);
   ASSERT_TRUE(tight);
   ASSERT_TRUE(loose);
@@ -114,12 +115,12 @@ TEST(ResectFrame, ATightRotationPriorHoldsTheRotation) {
 // A hundred standard deviations off, as a plane's second motion can be that frames see alone.
 TEST(ResectFrame, ARotationThatPointsRefuteCountsForNothing) {
   const ResectionOptions options = {.max_iterations = 200};
-  const SeenPoints view = MakeView(CameraModel::kPinhole, 200, 0.3, 0.0);
+  const PointsInView view = MakeView(CameraModel::kPinhole, 200, 0.3, 0.0);
   ResectionStart start = NearStart(view, 0.2, 0.3);
   start.rotation_covariance = std::pow(0.002 * kRadFromDeg, 2) * Eigen::Matrix3d::Identity();
-  const auto pose = ResectFrame(view.camera, view.sightings, start, options);
+  const auto pose = ResectFrame(view.camera, view.observations, start, options);
   start.rotation_covariance.reset();
-  const auto by_points = ResectFrame(view.camera, view.sightings, start, options);
+  const auto by_points = ResectFrame(view.camera, view.observations, start, options);
   ASSERT_TRUE(pose);
   ASSERT_TRUE(by_points);
   EXPECT_LT(SquaredMahalanobis(*pose, view), 22.5);
@@ -128,13 +129,13 @@ TEST(ResectFrame, ARotationThatPointsRefuteCountsForNothing) {
 }
 
 TEST(ResectFrame, PointsThatFitARotationWithinTheirDeviationsDoNotRefuteIt) {
-  SeenPoints view = MakeView(CameraModel::kPinhole, 100, 0.05, 0.0);
+  PointsInView view = MakeView(CameraModel::kPinhole, 100, 0.05, 0.0);
   ResectionStart start = NearStart(view, 0.2, 0.3);
   start.rotation_covariance = std::pow(0.002 * kRadFromDeg, 2) * Eigen::Matrix3d::Identity();
   // Held, it leaves 0.78 px of each.
   const auto turn_deg = [&](double sigma_px) {
-    for (PointSighting& sighting : view.sightings) sighting.sigma_px = sigma_px;
-    const auto pose = ResectFrame(view.camera, view.sightings, start, {.max_iterations = 200});
+    for (PointObservation2D3D& observation : view.observations) observation.sigma_px = sigma_px;
+    const auto pose = ResectFrame(view.camera, view.observations, start, {.max_iterations = 200});
     return pose ? AngleErrorDeg(*pose, view) : 180.0;
   };
   EXPECT_LT(turn_deg(0.3), 0.01);
@@ -142,25 +143,26 @@ TEST(ResectFrame, PointsThatFitARotationWithinTheirDeviationsDoNotRefuteIt) {
 }
 
 TEST(ResectFrame, SaysNoToTooLittle) {
-  const SeenPoints view = MakeView(CameraModel::kPinhole, 100, 0.0, 0.0);
+  const PointsInView view = MakeView(CameraModel::kPinhole, 100, 0.0, 0.0);
   const ResectionStart start = NearStart(view, 0.5, 0.2);
   EXPECT_FALSE(ResectFrame(view.camera, {}, start, {}));
-  const std::vector<PointSighting> few(view.sightings.begin(), view.sightings.begin() + 9);
+  const std::vector<PointObservation2D3D> few(view.observations.begin(),
+                                              view.observations.begin() + 9);
   EXPECT_FALSE(ResectFrame(view.camera, few, start, {}));
-  EXPECT_FALSE(
-      ResectFrame(view.camera, std::vector<PointSighting>(50, view.sightings[0]), start, {}));
-  std::vector<PointSighting> nan = view.sightings;
-  for (PointSighting& sighting : nan) sighting.keypoint_px.x() = std::nan("");
+  EXPECT_FALSE(ResectFrame(
+      view.camera, std::vector<PointObservation2D3D>(50, view.observations[0]), start, {}));
+  std::vector<PointObservation2D3D> nan = view.observations;
+  for (PointObservation2D3D& observation : nan) observation.keypoint_px.x() = std::nan("");
   EXPECT_FALSE(ResectFrame(view.camera, nan, start, {}));
-  std::vector<PointSighting> behind = view.sightings;
-  for (PointSighting& sighting : behind) {
-    sighting.point_in_world = 2.0 * view.center_in_world - sighting.point_in_world;
+  std::vector<PointObservation2D3D> behind = view.observations;
+  for (PointObservation2D3D& observation : behind) {
+    observation.point_in_world = 2.0 * view.center_in_world - observation.point_in_world;
   }
   EXPECT_FALSE(ResectFrame(view.camera, behind, start, {}));
   ResectionStart broken = start;
   broken.center_in_world.x() = std::nan("");
-  EXPECT_THROW(ResectFrame(view.camera, view.sightings, broken, {}), std::invalid_argument);
-  EXPECT_THROW(ResectFrame(view.camera, view.sightings, start, {.min_inliers = 1}),
+  EXPECT_THROW(ResectFrame(view.camera, view.observations, broken, {}), std::invalid_argument);
+  EXPECT_THROW(ResectFrame(view.camera, view.observations, start, {.min_inliers = 1}),
                std::invalid_argument);
 }
 

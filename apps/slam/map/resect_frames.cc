@@ -29,7 +29,7 @@ std::map<FrameId, ResectedPose> ResectFrames(const std::map<FrameId, ResectionSt
   struct SeenFrame {
     FrameId id;
     const ResectionStart* start;
-    std::vector<PointSighting> sightings;
+    std::vector<PointObservation2D3D> observations;
     std::optional<ResectedPose> pose;
   };
   std::vector<SeenFrame> frames;
@@ -44,12 +44,15 @@ std::map<FrameId, ResectedPose> ResectFrames(const std::map<FrameId, ResectionSt
     for (const Observation& observation : track.observations) {
       const auto seen_from = place.find(observation.frame);
       if (seen_from == place.end()) continue;
-      frames[seen_from->second].sightings.push_back(
-          {point->second, observation.keypoint_px, observation.sigma_px, observation.blur});
+      frames[seen_from->second].observations.push_back({track.id,
+                                                        point->second,
+                                                        observation.keypoint_px,
+                                                        observation.sigma_px,
+                                                        observation.blur});
     }
   }
   ParallelFor(static_cast<int>(frames.size()), num_threads, [&](int k) {
-    frames[k].pose = ResectFrame(camera, frames[k].sightings, *frames[k].start, options);
+    frames[k].pose = ResectFrame(camera, frames[k].observations, *frames[k].start, options);
   });
   std::map<FrameId, ResectedPose> poses;
   for (const SeenFrame& frame : frames) {

@@ -16,19 +16,17 @@ constexpr int kMaxTriples = 1000;
 // Probability of having drawn no triple of inliers at which sampling stops.
 constexpr double kMissed = 1e-3;
 
-// A sighting and its ray, on the plane at depth one.
-struct Seen {
-  const PointSighting* sighting = nullptr;
-  Eigen::Vector2d at;
-};
+using Triple = std::array<const PointObservation2D3D*, 3>;
 
-std::vector<ResectionStart> PosesOf(const std::array<const Seen*, 3>& triple) {
+// @param triple  keypoints that the camera model reaches.
+std::vector<ResectionStart> PosesOf(const Camera& camera, const Triple& triple) {
   cv::Mat points(3, 1, CV_64FC3);
   cv::Mat images(3, 1, CV_64FC2);
   for (int k = 0; k < 3; ++k) {
-    const Eigen::Vector3d& point = triple[k]->sighting->point_in_world;
+    const Eigen::Vector3d& point = triple[k]->point_in_world;
+    const Eigen::Vector3d bearing = *camera.Unproject(triple[k]->keypoint_px);
     points.at<cv::Vec3d>(k) = {point.x(), point.y(), point.z()};
-    images.at<cv::Vec2d>(k) = {triple[k]->at.x(), triple[k]->at.y()};
+    images.at<cv::Vec2d>(k) = {bearing.x() / bearing.z(), bearing.y() / bearing.z()};
   }
   std::vector<cv::Mat> turns;
   std::vector<cv::Mat> shifts;
@@ -47,25 +45,25 @@ std::vector<ResectionStart> PosesOf(const std::array<const Seen*, 3>& triple) {
 }  // namespace
 
 std::optional<ResectedPose> FindAbsolutePose(const Camera& camera,
-                                             const std::vector<PointSighting>& sightings,
+                                             const std::vector<PointObservation2D3D>& observations,
                                              const ResectionOptions& options,
                                              std::uint64_t seed) {
   constexpr double kLeastDepth = 0.1;
-  std::vector<Seen> seen;
-  for (const PointSighting& sighting : sightings) {
-    const auto bearing = camera.Unproject(sighting.keypoint_px);
+  std::vector<const PointObservation2D3D*> seen;
+  for (const PointObservation2D3D& observation : observations) {
+    const auto bearing = camera.Unproject(observation.keypoint_px);
     if (!bearing || bearing->z() < kLeastDepth * bearing->norm()) continue;
-    seen.push_back({&sighting, bearing->head<2>() / bearing->z()});
+    seen.push_back(&observation);
   }
   const int count = static_cast<int>(seen.size());
   if (count < std::max(3, options.min_inliers)) return std::nullopt;
   const auto count_inliers = [&](const ResectionStart& pose) {
     const Eigen::Matrix3d R_c_w = pose.cam_from_world.Matrix();
     int num_inliers = 0;
-    for (const PointSighting& sighting : sightings) {
-      const auto pixel =
-          camera.Project(Eigen::Vector3d(R_c_w * (sighting.point_in_world - pose.center_in_world)));
-      if (pixel && (*pixel - sighting.keypoint_px).norm() <= options.max_error_px) ++num_inliers;
+    for (const PointObservation2D3D& observation : observations) {
+      const auto pixel = camera.Project(
+          Eigen::Vector3d(R_c_w * (observation.point_in_world - pose.center_in_world)));
+      if (pixel && (*pixel - observation.keypoint_px).norm() <= options.max_error_px) ++num_inliers;
     }
     return num_inliers;
   };
@@ -77,7 +75,7 @@ std::optional<ResectedPose> FindAbsolutePose(const Camera& camera,
     const std::array<int, 3> drawn = {
         random.Index(count), random.Index(count), random.Index(count)};
     if (drawn[0] == drawn[1] || drawn[1] == drawn[2] || drawn[2] == drawn[0]) continue;
-    for (ResectionStart& pose : PosesOf({&seen[drawn[0]], &seen[drawn[1]], &seen[drawn[2]]})) {
+    for (ResectionStart& pose : PosesOf(camera, {seen[drawn[0]], seen[drawn[1]], seen[drawn[2]]})) {
       const int num_inliers = count_inliers(pose);
       if (num_inliers <= most_inliers) continue;
       most_inliers = num_inliers;
@@ -88,7 +86,7 @@ std::optional<ResectedPose> FindAbsolutePose(const Camera& camera,
     }
   }
   if (!best) return std::nullopt;
-  return ResectFrame(camera, sightings, *best, options);
+  return ResectFrame(camera, observations, *best, options);
 }
 
 }  // namespace rotslam

@@ -37,7 +37,8 @@ FrameFinder::FrameFinder(const std::vector<const Reconstruction*>& maps,
     for (const Track& track : maps[k]->tracks) {
       if (!maps[k]->point_in_world.contains(track.id)) continue;
       for (const Observation& observation : track.observations) {
-        seen_[observation.frame].push_back({track.id, observation.keypoint_px});
+        seen_[observation.frame].push_back(
+            {track.id, maps[k]->point_in_world.at(track.id), observation.keypoint_px});
         points_[observation.frame].push_back(track.id);
       }
     }
@@ -50,13 +51,13 @@ int FrameFinder::CountCommon(FrameId a, FrameId b) const {
   return CountCommonTracks(PointsOf(a), PointsOf(b));
 }
 
-std::map<FrameId, std::vector<Sighted>> FrameFinder::PointsOfTracks(
+std::map<FrameId, std::vector<PointObservation2D3D>> FrameFinder::PointsOfTracks(
     const std::vector<Track>& tracks) const {
   std::vector<std::map<TrackId, std::vector<FrameId>>> seers(maps_.size());
   for (const auto& [frame, points] : points_) {
     for (const TrackId track : points) seers[MapOf(frame)][track].push_back(frame);
   }
-  std::map<FrameId, std::vector<Sighted>> known;
+  std::map<FrameId, std::vector<PointObservation2D3D>> known;
   for (const Track& track : tracks) {
     for (const Observation& observation : track.observations) {
       const auto map = map_of_.find(observation.frame);
@@ -66,7 +67,9 @@ std::map<FrameId, std::vector<Sighted>> FrameFinder::PointsOfTracks(
       const std::vector<FrameId>& others = frames->second;
       const auto num_others =
           std::ssize(others) - std::count(others.begin(), others.end(), observation.frame);
-      if (num_others >= 2) known[observation.frame].push_back({track.id, observation.keypoint_px});
+      if (num_others < 2) continue;
+      known[observation.frame].push_back(
+          {track.id, maps_[map->second]->point_in_world.at(track.id), observation.keypoint_px});
     }
   }
   return known;
@@ -86,7 +89,7 @@ bool FrameFinder::IsOpen(const Lookalike& pair) const {
 }
 
 std::optional<FoundFrame> FrameFinder::Find(const Lookalike& pair) const {
-  std::vector<Sighted> recognised;
+  std::vector<PointObservation2D3D> recognised;
   const auto is_clear = [](const std::optional<FoundFrame>& found) {
     return found && (found->is_displaced || found->is_right);
   };
@@ -111,8 +114,8 @@ std::optional<FoundFrame> FrameFinder::Find(const Lookalike& pair) const {
   return found;
 }
 
-std::optional<FoundFrame> FrameFinder::FindByTracks(FrameId frame,
-                                                    const std::vector<Sighted>& points) const {
+std::optional<FoundFrame> FrameFinder::FindByTracks(
+    FrameId frame, const std::vector<PointObservation2D3D>& points) const {
   // Largest share of the inliers of the found pose that the present pose may explain. The tracks
   // that caused a wrong pose are among those tested, so more than that is no contradiction.
   constexpr double kMaxPresentShare = 0.5;
@@ -148,16 +151,18 @@ std::optional<TrackId> FrameFinder::PointAt(FrameId frame, const Eigen::Vector2d
   double least = kMaxDistancePx;
   const auto seen = seen_.find(frame);
   if (seen == seen_.end()) return nearest;
-  for (const Sighted& sighted : seen->second) {
-    const double distance = (sighted.keypoint_px - px).norm();
+  for (const PointObservation2D3D& observation : seen->second) {
+    const double distance = (observation.keypoint_px - px).norm();
     if (distance > least) continue;
     least = distance;
-    nearest = sighted.track;
+    nearest = observation.track;
   }
   return nearest;
 }
 
-void FrameFinder::Recognise(FrameId frame, FrameId match, std::vector<Sighted>& recognised) const {
+void FrameFinder::Recognise(FrameId frame,
+                            FrameId match,
+                            std::vector<PointObservation2D3D>& recognised) const {
   const Rotation predicted =
       MapOf(frame) == MapOf(match)
           ? PresentPose(frame).cam_from_world * PresentPose(match).cam_from_world.Inverse()
@@ -167,7 +172,8 @@ void FrameFinder::Recognise(FrameId frame, FrameId match, std::vector<Sighted>& 
   for (const Match& pair : places_.Between(match, frame, predicted)) {
     const auto point = PointAt(match, from.keypoints_px[pair.i.value]);
     if (!point) continue;
-    const Sighted one = {*point, to.keypoints_px[pair.j.value]};
+    const PointObservation2D3D one = {
+        *point, maps_[MapOf(match)]->point_in_world.at(*point), to.keypoints_px[pair.j.value]};
     // Neighbours match some of the same points.
     const bool is_known = std::any_of(recognised.begin(), recognised.end(), [&](const auto& other) {
       return other.track == one.track && other.keypoint_px == one.keypoint_px;
@@ -176,46 +182,34 @@ void FrameFinder::Recognise(FrameId frame, FrameId match, std::vector<Sighted>& 
   }
 }
 
-std::vector<PointSighting> FrameFinder::SightingsOf(int map,
-                                                    const std::vector<Sighted>& points) const {
-  std::vector<PointSighting> sightings;
-  sightings.reserve(points.size());
-  for (const Sighted& one : points) {
-    sightings.push_back({maps_[map]->point_in_world.at(one.track), one.keypoint_px, 1.0});
-  }
-  return sightings;
-}
-
-bool FrameFinder::Explains(const ResectionStart& pose, const PointSighting& sighting) const {
+bool FrameFinder::Explains(const ResectionStart& pose,
+                           const PointObservation2D3D& observation) const {
   const auto pixel = camera_.Project(
-      pose.cam_from_world * Eigen::Vector3d(sighting.point_in_world - pose.center_in_world));
-  return pixel && (*pixel - sighting.keypoint_px).norm() <= kMaxErrorPx;
+      pose.cam_from_world * Eigen::Vector3d(observation.point_in_world - pose.center_in_world));
+  return pixel && (*pixel - observation.keypoint_px).norm() <= kMaxErrorPx;
 }
 
-std::optional<FoundFrame> FrameFinder::FindPose(FrameId frame,
-                                                int map,
-                                                const std::vector<Sighted>& points) const {
-  const std::vector<PointSighting> sightings = SightingsOf(map, points);
+std::optional<FoundFrame> FrameFinder::FindPose(
+    FrameId frame, int map, const std::vector<PointObservation2D3D>& points) const {
   ResectionOptions resection;
   resection.max_error_px = kMaxErrorPx;
   resection.min_inliers = options_.min_inliers;
   const std::uint64_t seed = seed_ + static_cast<std::uint64_t>(frame.value) * 7919U;
-  const auto pose = FindAbsolutePose(camera_, sightings, resection, seed);
+  const auto pose = FindAbsolutePose(camera_, points, resection, seed);
   if (!pose) return std::nullopt;
   FoundFrame found;
   found.frame = frame;
   found.num_inliers = pose->num_inliers;
-  if (MapOf(frame) == map) Compare(points, sightings, *pose, found);
+  if (MapOf(frame) == map) Compare(points, *pose, found);
   found.is_displaced =
       found.num_present + kMinGainSigmas * std::sqrt(pose->num_inliers) < pose->num_inliers;
   found.is_right = found.is_right && !found.is_displaced;
   found.is_near = found.num_agreeing >= options_.min_inliers && !found.is_displaced;
-  if (found.is_displaced) Describe(*pose, map, points, sightings, found);
+  if (found.is_displaced) Describe(*pose, map, points, found);
   return found;
 }
 
-void FrameFinder::Compare(const std::vector<Sighted>& points,
-                          const std::vector<PointSighting>& sightings,
+void FrameFinder::Compare(const std::vector<PointObservation2D3D>& points,
                           const ResectedPose& pose,
                           FoundFrame& found) const {
   constexpr double kRightShare = 0.8;  // of the found pose's inliers, if the present one is right
@@ -224,11 +218,11 @@ void FrameFinder::Compare(const std::vector<Sighted>& points,
   const std::vector<TrackId>& own = PointsOf(found.frame);
   int num_free_inliers = 0;
   for (std::size_t k = 0; k < points.size(); ++k) {
-    const bool fits = Explains(present, sightings[k]);
+    const bool fits = Explains(present, points[k]);
     found.num_present += fits ? 1 : 0;
     if (std::binary_search(own.begin(), own.end(), points[k].track)) continue;
     found.num_agreeing += fits ? 1 : 0;
-    num_free_inliers += Explains(now, sightings[k]) ? 1 : 0;
+    num_free_inliers += Explains(now, points[k]) ? 1 : 0;
   }
   found.is_right = found.num_agreeing >= options_.min_inliers &&
                    found.num_agreeing >= kRightShare * num_free_inliers;
@@ -236,8 +230,7 @@ void FrameFinder::Compare(const std::vector<Sighted>& points,
 
 void FrameFinder::Describe(const ResectedPose& pose,
                            int map_of_points,
-                           const std::vector<Sighted>& points,
-                           const std::vector<PointSighting>& sightings,
+                           const std::vector<PointObservation2D3D>& points,
                            FoundFrame& found) const {
   constexpr int kMinRatios = 5;  // of depths, for a median that tolerates two outliers
   const ResectionStart present = PresentPose(found.frame);
@@ -246,15 +239,15 @@ void FrameFinder::Describe(const ResectedPose& pose,
   const bool is_same_map = MapOf(found.frame) == map_of_points;
   std::vector<double> ratios;
   for (std::size_t k = 0; k < points.size(); ++k) {
-    if (!Explains(now, sightings[k])) continue;
+    if (!Explains(now, points[k])) continue;
     const Eigen::Vector2d& px = points[k].keypoint_px;
     const auto bearing = camera_.Unproject(px);
     if (!bearing) continue;
-    found.sightings.push_back({points[k].track, {found.frame, px, *bearing, 1.0}});
+    found.observations.push_back({points[k].track, {found.frame, px, *bearing, 1.0}});
     const auto own = PointAt(found.frame, px);
     if (!own || (is_same_map && *own == points[k].track)) continue;
     const double depth = (map.point_in_world.at(*own) - present.center_in_world).norm();
-    ratios.push_back((sightings[k].point_in_world - now.center_in_world).norm() / depth);
+    ratios.push_back((points[k].point_in_world - now.center_in_world).norm() / depth);
   }
   Similarity& move = found.move;
   if (std::ssize(ratios) >= kMinRatios) move.scale = Median(ratios);

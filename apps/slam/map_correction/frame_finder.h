@@ -18,12 +18,6 @@ namespace rotslam {
 
 // Finds poses of a map's frames from points of the same or another map. Used by Relocalise only.
 
-// A point and its keypoint, or supposed keypoint, in a frame.
-struct Sighted {
-  TrackId track;
-  Eigen::Vector2d keypoint_px;
-};
-
 // A pose of a frame found from known points.
 struct FoundFrame {
   FrameId frame;
@@ -31,15 +25,15 @@ struct FoundFrame {
       match;                   // the frame that sees the points; none: found by the frame's tracks
   bool by_neighbours = false;  // points of the match's neighbours were used, too
   int num_inliers = 0;
-  int num_present = 0;  // sightings that the frame's present pose explains
-  // Explained sightings of points that the map does not observe in this frame, so that the frame
+  int num_present = 0;  // observations that the frame's present pose explains
+  // Explained observations of points that the map does not observe in this frame, so that the frame
   // has not contributed to their positions.
   int num_agreeing = 0;
   bool is_displaced = false;  // the present pose explains too little
   bool is_right = false;      // it explains as many, also among points not observed in the frame
   bool is_near = false;       // it explains more of those than chance would; implied by is_right
   Similarity move;            // of the frame's surroundings, into the world of the points
-  std::vector<std::pair<TrackId, Observation>> sightings;
+  std::vector<std::pair<TrackId, Observation>> observations;
 };
 
 class FrameFinder {
@@ -70,33 +64,32 @@ class FrameFinder {
   std::optional<FoundFrame> Find(const Lookalike& pair) const;
 
   // By frame: keypoints of its tracks whose points two other frames see.
-  std::map<FrameId, std::vector<Sighted>> PointsOfTracks(const std::vector<Track>& tracks) const;
+  std::map<FrameId, std::vector<PointObservation2D3D>> PointsOfTracks(
+      const std::vector<Track>& tracks) const;
 
   // Finds the pose of a frame from such points; nullopt unless the frame is displaced.
-  std::optional<FoundFrame> FindByTracks(FrameId frame, const std::vector<Sighted>& points) const;
+  std::optional<FoundFrame> FindByTracks(FrameId frame,
+                                         const std::vector<PointObservation2D3D>& points) const;
 
  private:
   ResectionStart PresentPose(FrameId frame) const;
   std::optional<TrackId> PointAt(FrameId frame, const Eigen::Vector2d& px) const;
   // Adds corners of the frame whose descriptors match those of points that the match sees.
-  void Recognise(FrameId frame, FrameId match, std::vector<Sighted>& recognised) const;
-  std::vector<PointSighting> SightingsOf(int map, const std::vector<Sighted>& points) const;
-  bool Explains(const ResectionStart& pose, const PointSighting& sighting) const;
+  void Recognise(FrameId frame, FrameId match, std::vector<PointObservation2D3D>& recognised) const;
+  bool Explains(const ResectionStart& pose, const PointObservation2D3D& observation) const;
   // @param map  of the points.
   std::optional<FoundFrame> FindPose(FrameId frame,
                                      int map,
-                                     const std::vector<Sighted>& points) const;
+                                     const std::vector<PointObservation2D3D>& points) const;
   // Counts what the present pose explains, and sets the flags of `found`.
-  void Compare(const std::vector<Sighted>& points,
-               const std::vector<PointSighting>& sightings,
+  void Compare(const std::vector<PointObservation2D3D>& points,
                const ResectedPose& pose,
                FoundFrame& found) const;
   // Sets the similarity that moves the frame and its surroundings into the world of the points. The
   // scale follows from the depths of the points in both maps.
   void Describe(const ResectedPose& pose,
                 int map_of_points,
-                const std::vector<Sighted>& points,
-                const std::vector<PointSighting>& sightings,
+                const std::vector<PointObservation2D3D>& points,
                 FoundFrame& found) const;
 
   const std::vector<const Reconstruction*>& maps_;
@@ -105,7 +98,7 @@ class FrameFinder {
   const RelocalisationOptions& options_;
   std::uint64_t seed_;
   std::map<FrameId, int> map_of_;
-  std::map<FrameId, std::vector<Sighted>> seen_;
+  std::map<FrameId, std::vector<PointObservation2D3D>> seen_;
   std::map<FrameId, std::vector<TrackId>> points_;  // ascending
 };
 

@@ -9,10 +9,10 @@ namespace rotslam {
 namespace {
 
 // Adds observations to the tracks, where their frame has none yet.
-std::vector<Track> WithSightings(const std::vector<std::pair<TrackId, Observation>>& sightings,
-                                 std::vector<Track> tracks) {
+std::vector<Track> WithObservations(
+    const std::vector<std::pair<TrackId, Observation>>& observations, std::vector<Track> tracks) {
   std::map<TrackId, std::map<FrameId, Observation>> added;
-  for (const auto& [track, observation] : sightings) {
+  for (const auto& [track, observation] : observations) {
     added[track].try_emplace(observation.frame, observation);
   }
   for (Track& track : tracks) {
@@ -105,7 +105,7 @@ std::set<FrameId> RefineRelocalised(const std::vector<RelocalisedMap>& maps,
     // fixed, since all have the same lens.
     const bool is_all = parts.size() == refined.components.size();
     const Camera& camera = is_all ? calibrated : refined.camera;
-    std::vector<Track> seen = WithBearingsOf(camera, WithSightings(map.sightings, tracks));
+    std::vector<Track> seen = WithBearingsOf(camera, WithObservations(map.observations, tracks));
     BundleResult bundle = RefineComponent(component,
                                           map.cam_from_world,
                                           map.center_in_world,

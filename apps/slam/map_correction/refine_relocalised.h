@@ -14,7 +14,7 @@ namespace rotslam {
 /// components, or of the rejected map.
 /// @param maps        indices of parts beyond the components denote frames that had no place.
 /// @param calibrated  the camera as it was given.
-/// @param tracks      the input of Relocalise; receive the sightings of the accepted maps.
+/// @param tracks      the input of Relocalise; receive the observations of the accepted maps.
 /// @param refined     what Relocalise was given.
 /// @return  the keyframes that were moved.
 std::set<FrameId> RefineRelocalised(const std::vector<RelocalisedMap>& maps,

@@ -61,7 +61,7 @@ std::vector<FoundFrame> FindAll(const FrameFinder& finder,
 std::vector<FoundFrame> FindAllByTracks(const FrameFinder& finder,
                                         const std::vector<Track>& tracks,
                                         int num_threads) {
-  std::map<FrameId, std::vector<Sighted>> known = finder.PointsOfTracks(tracks);
+  std::map<FrameId, std::vector<PointObservation2D3D>> known = finder.PointsOfTracks(tracks);
   std::vector<FrameId> frames;
   frames.reserve(known.size());
   for (const auto& [frame, points] : known) frames.push_back(frame);
@@ -261,8 +261,8 @@ class MergedMaps {
 };
 
 void Append(const std::vector<std::pair<TrackId, Observation>>& more,
-            std::vector<std::pair<TrackId, Observation>>& sightings) {
-  sightings.insert(sightings.end(), more.begin(), more.end());
+            std::vector<std::pair<TrackId, Observation>>& observations) {
+  observations.insert(observations.end(), more.begin(), more.end());
 }
 
 }  // namespace
@@ -304,7 +304,7 @@ std::vector<RelocalisedMap> Relocalise(const std::vector<const Reconstruction*>&
       const bool stands = part == joined.LargestOf(now.parts);
       const Displaced displaced(finder, *maps[part], inside[part]);
       for (const FoundFrame* found : inside[part]) {
-        if (displaced.IsTaken(*found)) Append(found->sightings, now.sightings);
+        if (displaced.IsTaken(*found)) Append(found->observations, now.observations);
       }
       for (const auto& [frame, center] : maps[part]->center_in_world) {
         Rotation rotation = maps[part]->cam_from_world.at(frame);
@@ -323,7 +323,7 @@ std::vector<RelocalisedMap> Relocalise(const std::vector<const Reconstruction*>&
     for (const FoundFrame* link : links) {
       if (now.parts.contains(finder.MapOf(link->frame)) &&
           now.parts.contains(finder.MapOf(*link->match))) {
-        Append(link->sightings, now.sightings);
+        Append(link->observations, now.observations);
       }
     }
     if (!now.moved.empty()) changed.push_back(std::move(now));

@@ -20,7 +20,7 @@ struct RelocalisedMap {
   RotationMap cam_from_world;
   CenterMap center_in_world;
   // Observations of known points that it rests on.
-  std::vector<std::pair<TrackId, Observation>> sightings;
+  std::vector<std::pair<TrackId, Observation>> observations;
   std::set<FrameId> moved;  // frames whose place differs from that in the largest of the parts
 };
 

@@ -114,7 +114,7 @@ TEST(RegisterViews, LeavesKnownCentresAlone) {
   for (const auto& [frame, center] : before) EXPECT_EQ(centers.at(frame), center);
 }
 
-TEST(PlacedSightings, AreThoseWithACentre) {
+TEST(PosedRays, AreThoseWithACentre) {
   const Scene scene = CleanOrNoisyStreet(0.0, 0.0);
   Track track = *std::ranges::find_if(scene.tracks, [](const Track& one) {
     return one.observations.size() >= 3 && one.observations[1].frame.value < 10;
@@ -123,13 +123,13 @@ TEST(PlacedSightings, AreThoseWithACentre) {
   CenterMap centers = scene.true_center_in_world;
   centers.erase(track.observations[1].frame);
   std::vector<int> positions;
-  const std::vector<Sighting> sightings =
-      PlacedSightings(scene.cam_from_world, centers, track, 700.0, &positions);
-  ASSERT_EQ(sightings.size(), track.observations.size() - 1);
+  const std::vector<PosedRay> rays =
+      PosedRays(scene.cam_from_world, centers, track, 700.0, &positions);
+  ASSERT_EQ(rays.size(), track.observations.size() - 1);
   EXPECT_EQ(positions[0], 0);
   EXPECT_EQ(positions[1], 2);
-  EXPECT_EQ(sightings[0].center_in_world, centers.at(track.observations[0].frame));
-  EXPECT_EQ(sightings[0].bearing, track.observations[0].bearing);
+  EXPECT_EQ(rays[0].center_in_world, centers.at(track.observations[0].frame));
+  EXPECT_EQ(rays[0].bearing, track.observations[0].bearing);
 }
 
 }  // namespace

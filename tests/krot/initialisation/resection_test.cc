@@ -7,12 +7,12 @@
 namespace rotslam {
 namespace {
 
-std::vector<RayToPoint> RaysFrom(const Eigen::Vector3d& center, int count, SceneRandom& random) {
-  std::vector<RayToPoint> rays;
+std::vector<PosedRay> RaysFrom(const Eigen::Vector3d& center, int count, SceneRandom& random) {
+  std::vector<PosedRay> rays;
   for (int k = 0; k < count; ++k) {
     const Eigen::Vector3d point(
         random.Uniform(-4, 4), random.Uniform(-3, 3), random.Uniform(5, 15));
-    rays.push_back({point, (point - center).normalized()});
+    rays.push_back({Rotation(), point, (center - point).normalized()});
   }
   return rays;
 }
@@ -31,10 +31,10 @@ TEST(ResectCenter, IsExactOnExactRays) {
 TEST(ResectCenter, ForgetsFortyPercentOfWrongRays) {
   SceneRandom random(4);
   const Eigen::Vector3d center(0.7, -0.2, 1.1);
-  std::vector<RayToPoint> rays = RaysFrom(center, 100, random);
+  std::vector<PosedRay> rays = RaysFrom(center, 100, random);
   for (int k = 0; k < 40; ++k) {
-    rays[k].ray_in_world =
-        Eigen::Vector3d(random.Uniform(-1, 1), random.Uniform(-1, 1), 1.0).normalized();
+    rays[k].bearing =
+        -Eigen::Vector3d(random.Uniform(-1, 1), random.Uniform(-1, 1), 1.0).normalized();
   }
   const auto resection = ResectCenter(rays, {});
   ASSERT_TRUE(resection);
@@ -46,9 +46,9 @@ TEST(ResectCenter, RefusesTooFewAndParallelRays) {
   SceneRandom random(5);
   EXPECT_FALSE(ResectCenter(RaysFrom(Eigen::Vector3d::Zero(), 2, random), {}));
   EXPECT_FALSE(ResectCenter({}, {}));
-  std::vector<RayToPoint> parallel;
+  std::vector<PosedRay> parallel;
   for (int k = 0; k < 10; ++k) {
-    parallel.push_back({Eigen::Vector3d(0, 0, 5.0 + k), Eigen::Vector3d::UnitZ()});
+    parallel.push_back({Rotation(), Eigen::Vector3d(0, 0, 5.0 + k), -Eigen::Vector3d::UnitZ()});
   }
   EXPECT_FALSE(ResectCenter(parallel, {}));
 }

@@ -160,7 +160,7 @@ class TwoComponents : public testing::Test {
       center += away;
       map.moved.insert(frame);
     }
-    map.sightings = common_;
+    map.observations = common_;
     return map;
   }
 
@@ -244,8 +244,8 @@ struct LostView {
       const bool had = known.observations.size() < track.observations.size();
       if (known.observations.size() < 2) {
         tracks.pop_back();
-      } else if (had && map.sightings.size() < kNumSightings) {
-        map.sightings.emplace_back(
+      } else if (had && map.observations.size() < kNumSightings) {
+        map.observations.emplace_back(
             track.id, *std::ranges::find_if(track.observations, [](const Observation& seen) {
               return seen.frame == kLost;
             }));
@@ -284,7 +284,7 @@ TEST(RefineRelocalised, AddsNoViewAtAHighPrice) {
 
 TEST(RefineRelocalised, AddsNoViewThatFewObservationsBearOut) {
   LostView lost;
-  lost.map.sightings.resize(20);
+  lost.map.observations.resize(20);
   lost.refined.bundles[0].summary.num_observations += 3 * LostView::kNumSightings;
   EXPECT_FALSE(lost.IsAdded());
 }

@@ -41,8 +41,8 @@ TEST(Relocalise, MovesFramesToWhereOthersSeeThem) {
   for (int k = 0; k < kFirstLate; ++k) {
     EXPECT_EQ(changed[0].center_in_world.at(FrameId{k}), map.center_in_world.at(FrameId{k}));
   }
-  EXPECT_GT(changed[0].sightings.size(), 100U);
-  for (const auto& [track, observation] : changed[0].sightings) {
+  EXPECT_GT(changed[0].observations.size(), 100U);
+  for (const auto& [track, observation] : changed[0].observations) {
     EXPECT_LT(track.value, kNumPoints);
     EXPECT_TRUE(IsLate(observation.frame));
     const auto px = walk.PixelOf(observation.frame, track.value);
@@ -62,7 +62,7 @@ TEST(Relocalise, JoinsMapsInTheWorldOfTheLargest) {
     EXPECT_EQ(changed[0].parts, (std::set<int>{0, 1}));
     EXPECT_EQ(changed[0].moved.size(), std::size_t{kNumFrames - kFirstLate});
     ExpectTruth(changed[0], walk.truth);
-    EXPECT_GT(changed[0].sightings.size(), 30U);
+    EXPECT_GT(changed[0].observations.size(), 30U);
   }
 }
 
@@ -162,7 +162,7 @@ TEST(Relocalise, IsTheSameOnAnyNumberOfThreads) {
   ASSERT_EQ(one.size(), 1U);
   ASSERT_EQ(four.size(), 1U);
   EXPECT_EQ(one[0].center_in_world, four[0].center_in_world);
-  EXPECT_EQ(one[0].sightings.size(), four[0].sightings.size());
+  EXPECT_EQ(one[0].observations.size(), four[0].observations.size());
 }
 
 }  // namespace
