@@ -106,12 +106,10 @@ std::vector<Block> FittingBlocks(const RotationMap& cam_from_world,
 
 // Programs over pieces of a component, whose time grows with its length only, joined by what the
 // pieces share.
-std::optional<ComponentStart> SolveInBlocks(const RotationMap& cam_from_world,
-                                            const std::vector<Track>& tracks,
+std::optional<ComponentStart> SolveInBlocks(const KrotProblem& problem,
                                             const ViewComponent& component,
-                                            const ComponentOptions& component_options,
-                                            const KrotOptions& options,
-                                            const KrotUnits& units) {
+                                            const ComponentOptions& component_options) {
+  const auto& [cam_from_world, tracks, options, units] = problem;
   ComponentStart start;
   std::vector<Block> blocks;
   for (const std::set<FrameId>& piece :
@@ -136,19 +134,17 @@ std::optional<ComponentStart> SolveInBlocks(const RotationMap& cam_from_world,
 
 }  // namespace
 
-std::optional<ComponentStart> StartComponent(const RotationMap& cam_from_world,
-                                             const std::vector<Track>& tracks,
+std::optional<ComponentStart> StartComponent(const KrotProblem& problem,
                                              const ViewComponent& component,
-                                             const ComponentOptions& component_options,
-                                             const KrotOptions& options,
-                                             const KrotUnits& units) {
+                                             const ComponentOptions& component_options) {
+  const auto& [cam_from_world, tracks, options, units] = problem;
   const std::set<FrameId> members(component.views.begin(), component.views.end());
   // Programs alone take more than their length by being long.
   const bool by_blocks = options.start != KrotStart::kPositioning &&
                          component.views.size() > static_cast<std::size_t>(options.max_lp_views);
   std::optional<ComponentStart> start =
       by_blocks
-          ? SolveInBlocks(cam_from_world, tracks, component, component_options, options, units)
+          ? SolveInBlocks(problem, component, component_options)
           : SolveSelected(cam_from_world, TracksOf(members, tracks, units.min_z), options, units);
   if (!start || start->centers.size() == component.views.size()) return start;
   RegistrationOptions growth;

@@ -1,12 +1,10 @@
 #pragma once
 
 #include <optional>
-#include <vector>
 
-#include "krot/krot_options.h"
+#include "krot/krot_problem.h"
 #include "krot/structure/components.h"
 #include "rotodom/types/maps.h"
-#include "rotodom/types/track.h"
 
 namespace rotslam {
 
@@ -20,14 +18,10 @@ struct ComponentStart {
 /// Solves the robust start's programs over a spread of tracks, in blocks of views where there are
 /// more than options.max_lp_views, or global positioning over all with options.start kPositioning,
 /// and places the views that they leave out, by resection.
-/// @param tracks             clean: finite unit bearings, frames ascending.
 /// @param component_options  what the component was found with, to find its blocks.
 /// @return  nullopt when that gives no structure.
-std::optional<ComponentStart> StartComponent(const RotationMap& cam_from_world,
-                                             const std::vector<Track>& tracks,
+std::optional<ComponentStart> StartComponent(const KrotProblem& problem,
                                              const ViewComponent& component,
-                                             const ComponentOptions& component_options,
-                                             const KrotOptions& options,
-                                             const KrotUnits& units);
+                                             const ComponentOptions& component_options);
 
 }  // namespace rotslam

@@ -141,21 +141,19 @@ void TakeCenters(const std::vector<FrameId>& views,
 // Enters what a component's observations say about the least possible largest residual; the best
 // structure's centres become the component's where they are asked for. Returns how the search
 // ended.
-BisectionStatus BoundResidual(const RotationMap& cam_from_world,
-                              const std::vector<Track>& tracks,
+BisectionStatus BoundResidual(const KrotProblem& problem,
                               const TriangulatedTracks& points,
-                              const KrotOptions& options,
-                              const KrotUnits& units,
                               CenterMap& centers,
                               KrotSolution& solution) {
+  const auto& [cam_from_world, tracks, options, units] = problem;
   const KeptProblem kept = TakeKept(cam_from_world, centers, tracks, points, units.min_z);
-  const MinimaxProblem& problem = kept.named.problem;
+  const MinimaxProblem& minimax = kept.named.problem;
   BisectionResult bracket;
   bracket.status = BisectionStatus::kIterationLimit;
-  bracket.gamma_high = MaxBoxResidual(problem, kept.structure);
+  bracket.gamma_high = MaxBoxResidual(minimax, kept.structure);
   const bool decides = options.start == KrotStart::kBisection;
-  if (options.use_bracket && (decides || problem.num_views() <= options.max_bracket_views)) {
-    bracket = MinimiseMaxResidual(problem, options.bisection, &kept.structure);
+  if (options.use_bracket && (decides || minimax.num_views() <= options.max_bracket_views)) {
+    bracket = MinimiseMaxResidual(minimax, options.bisection, &kept.structure);
     if (decides && bracket.gamma_high < kInfinity) {
       TakeCenters(kept.named.views, bracket.structure.center_in_world, centers);
     }
@@ -164,15 +162,15 @@ BisectionStatus BoundResidual(const RotationMap& cam_from_world,
     solution.gamma_high = bracket.gamma_high;
     solution.active.clear();
     for (const int o : bracket.active) {
-      const ImageObservation& observation = problem.observations[o];
+      const ImageObservation& observation = minimax.observations[o];
       solution.active.push_back(
           {kept.named.tracks[observation.point], kept.named.views[observation.view]});
     }
   }
   solution.gamma_low = std::max(solution.gamma_low, bracket.gamma_low);
   solution.num_programs += bracket.num_programs;
-  solution.num_bracket_observations += static_cast<int>(problem.observations.size());
-  solution.num_bracket_tracks += problem.num_points;
+  solution.num_bracket_observations += static_cast<int>(minimax.observations.size());
+  solution.num_bracket_tracks += minimax.num_points;
   return bracket.status;
 }
 
@@ -197,38 +195,14 @@ void Normalise(CenterMap& centers, const std::vector<Track>& tracks, Triangulate
   }
 }
 
-// Solves one component and enters it into the solution under its number. Returns how the search for
-// its bracket ended; nullopt when its programs failed.
-std::optional<BisectionStatus> SolveComponent(const RotationMap& cam_from_world,
-                                              const std::vector<Track>& tracks,
-                                              const std::vector<double>& thresholds,
-                                              const ViewComponent& component,
-                                              const ComponentOptions& component_options,
-                                              const KrotOptions& options,
-                                              const KrotUnits& units,
-                                              KrotSolution& solution) {
-  const std::set<FrameId> members(component.views.begin(), component.views.end());
-  std::optional<ComponentStart> start =
-      StartComponent(cam_from_world, tracks, component, component_options, options, units);
-  if (!start) return std::nullopt;
-  CenterMap& centers = start->centers;
-  solution.num_programs += start->num_programs;
-  solution.num_grown_views += start->num_grown_views;
-  const auto triangulate = [&] {
-    return TriangulateAll(cam_from_world, centers, tracks, thresholds, options, units);
-  };
-  TriangulatedTracks points = triangulate();
-  const BisectionStatus bracket =
-      BoundResidual(cam_from_world, tracks, points, options, units, centers, solution);
-  if (options.start == KrotStart::kBisection) points = triangulate();
-  Normalise(centers, tracks, points);
-  const int number =
-      solution.component.empty()
-          ? 0
-          : 1 + std::max_element(solution.component.begin(),
-                                 solution.component.end(),
-                                 [](const auto& a, const auto& b) { return a.second < b.second; })
-                    ->second;
+// Enters the positions and points of one more component into the solution.
+void EnterComponent(const std::vector<Track>& tracks,
+                    const CenterMap& centers,
+                    const TriangulatedTracks& points,
+                    const std::set<FrameId>& members,
+                    KrotSolution& solution) {
+  int number = 0;
+  for (const auto& [frame, other] : solution.component) number = std::max(number, other + 1);
   for (const auto& [frame, center] : centers) {
     solution.center_in_world[frame] = center;
     solution.component[frame] = number;
@@ -245,13 +219,34 @@ std::optional<BisectionStatus> SolveComponent(const RotationMap& cam_from_world,
       solution.removed.push_back({tracks[t].id, observation.frame, RemovalReason::kOtherComponent});
     }
   }
+}
+
+// Solves one component and enters it into the solution. Returns how the search for its bracket
+// ended; nullopt when its programs failed.
+std::optional<BisectionStatus> SolveComponent(const KrotProblem& problem,
+                                              const std::vector<double>& thresholds,
+                                              const ViewComponent& component,
+                                              const ComponentOptions& component_options,
+                                              KrotSolution& solution) {
+  std::optional<ComponentStart> start = StartComponent(problem, component, component_options);
+  if (!start) return std::nullopt;
+  CenterMap& centers = start->centers;
+  solution.num_programs += start->num_programs;
+  solution.num_grown_views += start->num_grown_views;
+  TriangulatedTracks points = TriangulateAll(problem, centers, thresholds);
+  const BisectionStatus bracket = BoundResidual(problem, points, centers, solution);
+  if (problem.options.start == KrotStart::kBisection) {
+    points = TriangulateAll(problem, centers, thresholds);
+  }
+  Normalise(centers, problem.tracks, points);
+  const std::set<FrameId> members(component.views.begin(), component.views.end());
+  EnterComponent(problem.tracks, centers, points, members, solution);
   return bracket;
 }
 
 // What hangs together among the component's views that got no position. A few chance matches can
 // have tied two places into one component: the one behind the bridge stands for itself then.
-std::vector<ViewComponent> LeftBehind(const RotationMap& cam_from_world,
-                                      const std::vector<Track>& tracks,
+std::vector<ViewComponent> LeftBehind(const KrotProblem& problem,
                                       const ViewComponent& component,
                                       const ComponentOptions& options,
                                       const KrotSolution& solution) {
@@ -262,13 +257,17 @@ std::vector<ViewComponent> LeftBehind(const RotationMap& cam_from_world,
     if (!solution.center_in_world.contains(view)) left.insert(view);
   }
   if (left.size() < kMinViews) return {};
-  const auto their_tracks = RestrictTracks(tracks, left, 2);
-  std::vector<ViewComponent> parts = FindComponents(cam_from_world, their_tracks, options);
+  const auto their_tracks = RestrictTracks(problem.tracks, left, 2);
+  std::vector<ViewComponent> parts = FindComponents(problem.cam_from_world, their_tracks, options);
   std::erase_if(parts, [](const ViewComponent& part) { return part.views.size() < kMinViews; });
   return parts;
 }
 
-void Describe(int num_views, int num_failed, const KrotUnits& units, KrotSolution& solution) {
+void Describe(const KrotProblem& problem, int num_failed, KrotSolution& solution) {
+  std::set<FrameId> views;
+  for (const Track& track : problem.tracks) {
+    for (const Observation& observation : track.observations) views.insert(observation.frame);
+  }
   const int num_placed = static_cast<int>(solution.center_in_world.size());
   int num_components = 0;
   for (const auto& [frame, number] : solution.component) {
@@ -277,13 +276,13 @@ void Describe(int num_views, int num_failed, const KrotUnits& units, KrotSolutio
   // Outwards, so that what is printed is a bracket, too.
   const auto px = [&](double gamma, double (*round)(double)) {
     std::ostringstream text;
-    text << std::fixed << std::setprecision(3) << round(1e3 * gamma * units.focal_px) / 1e3;
+    text << std::fixed << std::setprecision(3) << round(1e3 * gamma * problem.units.focal_px) / 1e3;
     return text.str();
   };
   const auto floor = [](double value) { return std::floor(value); };
   const auto ceil = [](double value) { return std::ceil(value); };
   solution.message =
-      std::to_string(num_placed) + " of " + std::to_string(num_views) + " views placed in " +
+      std::to_string(num_placed) + " of " + std::to_string(views.size()) + " views placed in " +
       std::to_string(num_components) + " component" + (num_components == 1 ? "" : "s") + ", " +
       std::to_string(solution.point_in_world.size()) + " points, largest residual in [" +
       px(solution.gamma_low, floor) + ", " + px(solution.gamma_high, ceil) + "] px over " +
@@ -293,61 +292,41 @@ void Describe(int num_views, int num_failed, const KrotUnits& units, KrotSolutio
   }
 }
 
-void Solve(const RotationMap& cam_from_world,
-           const std::vector<Track>& input,
-           const std::map<FrameId, double>& sigma_rad,
-           const KrotOptions& options,
-           KrotUnits units,
-           KrotSolution& solution) {
-  std::vector<Track> tracks = CleanTracks(input, solution.removed);
-  const std::vector<double> thresholds = TrackThresholds(tracks, sigma_rad, units);
-  // The linear programs have one bound for all: that of the median track.
-  units = WithThreshold(units, Median(thresholds, units.gamma), options);
-  std::set<FrameId> views;
+// Why the tracks say nothing of positions; nullopt where they do.
+std::optional<std::string> LacksParallax(const KrotProblem& problem) {
   int num_usable = 0;
   int num_moving = 0;
-  ComponentOptions component_options;
-  component_options.min_parallax_rad = units.still_rad;
-  if (options.use_epipolar_filter) {
-    component_options.noise_rad =
-        RemoveEpipolarOutliers(cam_from_world, options, units, tracks, solution);
-  }
-  for (const Track& track : tracks) {
-    for (const Observation& observation : track.observations) views.insert(observation.frame);
+  for (const Track& track : problem.tracks) {
     if (track.observations.size() < 2) continue;
     ++num_usable;
-    num_moving += TrackParallax(cam_from_world, track) >= units.still_rad;
+    num_moving += TrackParallax(problem.cam_from_world, track) >= problem.units.still_rad;
   }
-  solution.status = KrotStatus::kInfeasible;
-  if (num_usable == 0) {
-    solution.message = "no track has two usable observations";
-    return;
-  }
-  if (num_moving < kMinSharedPoints) {
-    solution.message = "no parallax: " + std::to_string(num_moving) + " of " +
-                       std::to_string(num_usable) + " tracks move beyond what rotation explains";
-    return;
-  }
-  std::vector<ViewComponent> components = FindComponents(cam_from_world, tracks, component_options);
-  if (components.empty()) {
-    solution.message =
-        "no two views share " + std::to_string(kMinSharedPoints) + " tracks with parallax";
-    return;
-  }
+  if (num_usable == 0) return "no track has two usable observations";
+  if (num_moving >= kMinSharedPoints) return std::nullopt;
+  return "no parallax: " + std::to_string(num_moving) + " of " + std::to_string(num_usable) +
+         " tracks move beyond what rotation explains";
+}
+
+// Solves the components one after the other, and those that come apart from them.
+void SolveComponents(const KrotProblem& problem,
+                     const std::vector<double>& thresholds,
+                     const ComponentOptions& component_options,
+                     std::vector<ViewComponent> components,
+                     KrotSolution& solution) {
   int num_failed = 0;
   bool all_converged = true;
   bool cancelled = false;
   for (std::size_t k = 0; k < components.size(); ++k) {
     const ViewComponent component = components[k];
-    const auto bracket = SolveComponent(
-        cam_from_world, tracks, thresholds, component, component_options, options, units, solution);
+    const auto bracket =
+        SolveComponent(problem, thresholds, component, component_options, solution);
     all_converged = all_converged && bracket == BisectionStatus::kConverged;
     cancelled = cancelled || bracket == BisectionStatus::kCancelled;
     if (!bracket) {
       ++num_failed;
       continue;
     }
-    const auto left = LeftBehind(cam_from_world, tracks, component, component_options, solution);
+    const auto left = LeftBehind(problem, component, component_options, solution);
     components.insert(components.end(), left.begin(), left.end());
   }
   if (solution.center_in_world.empty()) {
@@ -358,20 +337,50 @@ void Solve(const RotationMap& cam_from_world,
   solution.status = cancelled       ? KrotStatus::kCancelled
                     : all_converged ? KrotStatus::kConverged
                                     : KrotStatus::kIterationLimit;
-  Describe(static_cast<int>(views.size()), num_failed, units, solution);
+  Describe(problem, num_failed, solution);
+}
+
+void Solve(const KrotProblem& problem,
+           const std::vector<double>& thresholds,
+           const ComponentOptions& component_options,
+           KrotSolution& solution) {
+  solution.status = KrotStatus::kInfeasible;
+  if (auto reason = LacksParallax(problem)) {
+    solution.message = *std::move(reason);
+    return;
+  }
+  std::vector<ViewComponent> components =
+      FindComponents(problem.cam_from_world, problem.tracks, component_options);
+  if (components.empty()) {
+    solution.message =
+        "no two views share " + std::to_string(kMinSharedPoints) + " tracks with parallax";
+    return;
+  }
+  SolveComponents(problem, thresholds, component_options, std::move(components), solution);
 }
 
 }  // namespace
 
 KrotSolution SolveKnownRotation(const RotationMap& cam_from_world,
-                                const std::vector<Track>& tracks,
+                                const std::vector<Track>& input,
                                 const Camera& camera,
                                 const KrotOptions& options,
                                 const std::map<FrameId, double>& sigma_rad) {
   const auto begin = std::chrono::steady_clock::now();
-  RequireContract(cam_from_world, tracks, camera, options);
+  RequireContract(cam_from_world, input, camera, options);
   KrotSolution solution;
-  Solve(cam_from_world, tracks, sigma_rad, options, KrotUnits(options, camera), solution);
+  KrotUnits units(options, camera);
+  std::vector<Track> tracks = CleanTracks(input, solution.removed);
+  const std::vector<double> thresholds = TrackThresholds(tracks, sigma_rad, units);
+  // The linear programs have one bound for all: that of the median track.
+  units = WithThreshold(units, Median(thresholds, units.gamma), options);
+  ComponentOptions component_options;
+  component_options.min_parallax_rad = units.still_rad;
+  if (options.use_epipolar_filter) {
+    component_options.noise_rad =
+        RemoveEpipolarOutliers(cam_from_world, options, units, tracks, solution);
+  }
+  Solve({cam_from_world, tracks, options, units}, thresholds, component_options, solution);
   std::sort(solution.removed.begin(),
             solution.removed.end(),
             [](const RemovedObservation& a, const RemovedObservation& b) {

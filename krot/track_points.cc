@@ -58,12 +58,10 @@ std::vector<Track> CleanTracks(const std::vector<Track>& tracks,
   return clean;
 }
 
-TriangulatedTracks TriangulateAll(const RotationMap& cam_from_world,
+TriangulatedTracks TriangulateAll(const KrotProblem& problem,
                                   const CenterMap& centers,
-                                  const std::vector<Track>& tracks,
-                                  const std::vector<double>& thresholds,
-                                  const KrotOptions& options,
-                                  const KrotUnits& units) {
+                                  const std::vector<double>& thresholds) {
+  const auto& [cam_from_world, tracks, options, units] = problem;
   TriangulatedTracks points(tracks.size());
   ParallelFor(static_cast<int>(tracks.size()), options.num_threads, [&](int t) {
     std::vector<int> observations;

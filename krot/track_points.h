@@ -4,6 +4,7 @@
 #include <vector>
 
 #include "krot/krot_options.h"
+#include "krot/krot_problem.h"
 #include "krot/krot_solution.h"
 #include "rotodom/camera/camera.h"
 #include "rotodom/types/maps.h"
@@ -32,11 +33,8 @@ using TriangulatedTracks = std::vector<std::optional<TriangulatedTrack>>;  // by
 /// Points of all tracks from the centres of some views.
 /// @param thresholds  of each track, largest bearing error of a right observation, rad; counted
 ///                    options.loose_factor times.
-TriangulatedTracks TriangulateAll(const RotationMap& cam_from_world,
+TriangulatedTracks TriangulateAll(const KrotProblem& problem,
                                   const CenterMap& centers,
-                                  const std::vector<Track>& tracks,
-                                  const std::vector<double>& thresholds,
-                                  const KrotOptions& options,
-                                  const KrotUnits& units);
+                                  const std::vector<double>& thresholds);
 
 }  // namespace rotslam

@@ -129,12 +129,8 @@ WindowProblem MakeWindow(const RotationMap& cam_from_world,
 }
 
 // Centres of the new views that the programs place.
-CenterMap PlaceNewViews(const RotationMap& cam_from_world,
-                        const std::vector<Track>& tracks,
-                        const KnownPart& part,
-                        const KrotOptions& options,
-                        const KrotUnits& units,
-                        KrotSolution& solution) {
+CenterMap PlaceNewViews(const KrotProblem& problem, const KnownPart& part, KrotSolution& solution) {
+  const auto& [cam_from_world, tracks, options, units] = problem;
   SelectionOptions selection;
   selection.observations_per_view = options.observations_per_view;
   selection.min_parallax_rad = units.lp_parallax_rad;
@@ -171,16 +167,13 @@ CenterMap PlaceNewViews(const RotationMap& cam_from_world,
 }
 
 // New points, and how far they and the known ones are from what the new views see.
-void TakeNewPoints(const RotationMap& cam_from_world,
-                   const std::vector<Track>& tracks,
+void TakeNewPoints(const KrotProblem& problem,
                    const CenterMap& centers,
                    const KnownPart& part,
-                   const KrotOptions& options,
-                   const KrotUnits& units,
                    KrotSolution& solution) {
+  const auto& [cam_from_world, tracks, options, units] = problem;
   const std::vector<double> thresholds(tracks.size(), units.gamma);
-  const TriangulatedTracks points =
-      TriangulateAll(cam_from_world, centers, tracks, thresholds, options, units);
+  const TriangulatedTracks points = TriangulateAll(problem, centers, thresholds);
   double largest = 0.0;
   for (std::size_t t = 0; t < tracks.size(); ++t) {
     const auto known = part.points.find(tracks[t].id);
@@ -228,7 +221,8 @@ KrotSolution ExtendKnownRotation(const KrotSolution& known,
   const std::vector<Track> clean = CleanTracks(input, removed);
   const KnownPart part = TakeKnown(known, clean);
   const std::vector<Track> tracks = UsableTracks(clean, known, part, units.min_z);
-  const CenterMap placed = PlaceNewViews(cam_from_world, tracks, part, options, units, solution);
+  const KrotProblem problem = {cam_from_world, tracks, options, units};
+  const CenterMap placed = PlaceNewViews(problem, part, solution);
   solution.status = KrotStatus::kInfeasible;
   solution.message = "no new view shares enough tracks with known ones";
   if (!placed.empty()) {
@@ -238,7 +232,7 @@ KrotSolution ExtendKnownRotation(const KrotSolution& known,
       solution.component[view] = part.component;
     }
     solution.removed = std::move(removed);
-    TakeNewPoints(cam_from_world, tracks, centers, part, options, units, solution);
+    TakeNewPoints(problem, centers, part, solution);
     solution.status = KrotStatus::kIterationLimit;
     solution.message = std::to_string(placed.size()) + " views placed on known ones";
   }

@@ -7,7 +7,7 @@
 
 #include <Eigen/Geometry>
 
-#include "krot/interior_point/recentring.h"
+#include "krot/interior_point/step_rule.h"
 #include "krot/structure/half_spaces.h"
 #include "rotodom/types/stopwatch.h"
 
@@ -240,7 +240,7 @@ bool NewtonStep(const Program& program, StructureSystem& system, Iterate& at) {
                  .sum();
   }
   const double shrink = ahead / count / mu;
-  const double target = std::clamp(std::pow(shrink, kGreed), 1e-6, 1.0) * mu;
+  const double target = TargetProduct(std::pow(shrink, kGreed), mu);
   const double trust = primal * dual;
   for (int o = 0; o < program.size(); ++o) {
     change.yr[o] += target - trust * predictor.y[o] * predictor.r[o];

@@ -8,7 +8,7 @@
 #include <Eigen/Dense>
 
 #include "krot/interior_point/interior_start.h"
-#include "krot/interior_point/recentring.h"
+#include "krot/interior_point/step_rule.h"
 #include "krot/lp/lp.h"
 #include "krot/structure/half_spaces.h"
 #include "rotodom/types/median.h"
@@ -211,14 +211,9 @@ void Advance(const Program& program, const Step& step, double primal, double dua
   const Fives before = at.r;
   UpdateRows(program, at);
   for (int o = 0; o < program.size(); ++o) {
-    // Rounding must not make an active row negative.
-    at.r[o] = at.r[o].max(1e-3 * before[o].min(before[o] + primal * step.r[o]));
+    at.r[o] = KeptPositive(at.r[o], before[o], step.r[o], primal);
     at.y[o] += dual * step.y[o];
   }
-}
-
-Reach ReachOf(const Iterate& at, const Step& step) {
-  return {StepToBoundary(at.r, step.r), StepToBoundary(at.y, step.y)};
 }
 
 // Change that moves the products after a step of that length towards `mu`.
@@ -272,14 +267,10 @@ bool NewtonStep(const Program& program, StructureSystem& system, Iterate& at, Ac
   Fives change(program.size());
   for (int o = 0; o < program.size(); ++o) change[o] = -at.y[o] * at.r[o];
   const Step predictor = newton.Solve(change, true);
-  const Reach free = ReachOf(at, predictor);
-  double sum = 0.0;
-  for (int o = 0; o < program.size(); ++o) {
-    sum +=
-        ((at.r[o] + free.primal * predictor.r[o]) * (at.y[o] + free.dual * predictor.y[o])).sum();
-  }
+  const Reach free = ReachOf(at.r, predictor.r, at.y, predictor.y);
+  const double sum = ProductsAfter(at.r, predictor.r, at.y, predictor.y, free);
   const double shrink = sum / (5.0 * program.size()) / mu;
-  const double target = std::clamp(shrink * shrink * shrink, 1e-6, 1.0) * mu;
+  const double target = TargetProduct(shrink * shrink * shrink, mu);
   const double trust = free.primal * free.dual;
   for (int o = 0; o < program.size(); ++o) {
     change[o] += target - trust * predictor.y[o] * predictor.r[o];
@@ -289,7 +280,7 @@ bool NewtonStep(const Program& program, StructureSystem& system, Iterate& at, Ac
   const auto [step, reach] = Lengthened(
       std::move(corrected),
       kMaxRecentrings,
-      [&](const Step& any) { return ReachOf(at, any); },
+      [&](const Step& any) { return ReachOf(at.r, any.r, at.y, any.y); },
       [&](const Step& from, const Reach& aim) {
         Step trial = newton.Solve(Recentring(at, from, aim, target), false);
         AddTo(from, trial);

@@ -7,6 +7,7 @@
 #include <Eigen/Dense>
 
 #include "krot/interior_point/interior_start.h"
+#include "krot/interior_point/step_rule.h"
 
 namespace rotslam {
 namespace {
@@ -96,16 +97,6 @@ PointIterate Start(const PointProgram& program, const Eigen::Vector3d& u, double
   return at;
 }
 
-double Ratio(const Sixes& value, const Sixes& step) {
-  double ratio = 1.0;
-  for (std::size_t o = 0; o < value.size(); ++o) {
-    for (int k = 0; k < 6; ++k) {
-      if (step[o][k] < 0.0) ratio = std::min(ratio, -value[o][k] / step[o][k]);
-    }
-  }
-  return ratio;
-}
-
 // Predictor and corrector on the four unknowns (u, s).
 bool NewtonStep(const PointProgram& program, PointIterate& at) {
   const int m = program.size();
@@ -143,23 +134,20 @@ bool NewtonStep(const PointProgram& program, PointIterate& at) {
       dy[o] = shift[o] - at.y[o] / at.r[o] * dr[o];
     }
     if (!predict) break;
-    const double primal = Ratio(at.r, dr);
-    const double dual = Ratio(at.y, dy);
-    double sum = 0.0;
-    for (int o = 0; o < m; ++o)
-      sum += ((at.r[o] + primal * dr[o]) * (at.y[o] + dual * dy[o])).sum();
-    target = std::clamp(std::pow(sum / (6.0 * m) / mu, 3), 1e-6, 1.0) * mu;
-    trust = primal * dual;
+    const Reach reach = ReachOf(at.r, dr, at.y, dy);
+    const double sum = ProductsAfter(at.r, dr, at.y, dy, reach);
+    target = TargetProduct(std::pow(sum / (6.0 * m) / mu, 3), mu);
+    trust = reach.primal * reach.dual;
   }
-  constexpr double kShortOf = 0.99;
-  const double primal = kShortOf * Ratio(at.r, dr);
-  const double dual = kShortOf * Ratio(at.y, dy);
+  const Reach reach = ReachOf(at.r, dr, at.y, dy);
+  const double primal = kShareOfReach * reach.primal;
+  const double dual = kShareOfReach * reach.dual;
   const Sixes before = at.r;
   at.u += primal * step.head<3>();
   at.s += primal * step[3];
   UpdateRows(program, at);
   for (int o = 0; o < m; ++o) {
-    at.r[o] = at.r[o].max(1e-3 * before[o].min(before[o] + primal * dr[o]));
+    at.r[o] = KeptPositive(at.r[o], before[o], dr[o], primal);
     at.y[o] += dual * dy[o];
   }
   return true;

@@ -1,20 +1,6 @@
 #include "krot/structure/half_spaces.h"
 
-#include <algorithm>
-
 namespace rotslam {
-
-double StepToBoundary(const Fives& value, const Fives& step) {
-  double ratio = 1.0;
-  for (std::size_t o = 0; o < value.size(); ++o) {
-    // Divisions are needed only for values that would become negative.
-    if ((value[o] + ratio * step[o] >= 0.0).all()) continue;
-    for (int k = 0; k < 5; ++k) {
-      if (step[o][k] < 0.0) ratio = std::min(ratio, -value[o][k] / step[o][k]);
-    }
-  }
-  return ratio;
-}
 
 Eigen::VectorXd Packed(const StructureLayout& layout, const MinimaxStructure& structure) {
   Eigen::VectorXd x(layout.size());

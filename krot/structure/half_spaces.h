@@ -75,9 +75,6 @@ class HalfSpaces {
   std::vector<Eigen::Matrix3d> axes_;  // columns r1 - u r3, r2 - v r3, r3
 };
 
-/// Largest step in [0, 1] along `step` that keeps all entries of `value` positive.
-double StepToBoundary(const Fives& value, const Fives& step);
-
 /// Converts a structure to the vector of unknowns in the gauge of view 0, and back.
 Eigen::VectorXd Packed(const StructureLayout& layout, const MinimaxStructure& structure);
 MinimaxStructure Unpacked(const StructureLayout& layout, const Eigen::VectorXd& x);

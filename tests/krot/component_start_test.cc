@@ -33,7 +33,7 @@ std::optional<ComponentStart> StartOf(const Scene& scene, const KrotOptions& opt
   if (components.empty()) return std::nullopt;
   EXPECT_EQ(components[0].views.size(), scene.cam_from_world.size());
   return StartComponent(
-      scene.cam_from_world, scene.tracks, components[0], component_options, options, units);
+      {scene.cam_from_world, scene.tracks, options, units}, components[0], component_options);
 }
 
 double LargestStartError(const CenterMap& centers, const Scene& scene) {
@@ -99,9 +99,11 @@ TEST(StartComponent, IsNothingWithoutTracks) {
   ViewComponent component;
   for (const auto& [frame, rotation] : scene.cam_from_world) component.views.push_back(frame);
   const KrotOptions options;
+  const KrotUnits units(options, scene.camera);
+  const std::vector<Track> tracks;
   EXPECT_FALSE(
       StartComponent(
-          scene.cam_from_world, {}, component, {}, options, KrotUnits(options, scene.camera))
+          {scene.cam_from_world, tracks, options, units}, component, {})
           .has_value());
 }
 
