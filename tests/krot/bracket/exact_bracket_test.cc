@@ -4,6 +4,7 @@
 #include <gtest/gtest.h>
 
 #include "krot/bracket/bisection.h"
+#include "krot/structure/minimax_lp.h"
 #include "tests/krot/problem_from_scene.h"
 
 namespace rotslam {
