@@ -4,6 +4,7 @@
 #include <limits>
 #include <stdexcept>
 
+#include "rotodom/sequence/image_list.h"
 #include "rotodom/sequence/sequence.h"
 #include "rotodom/sequence/sequence_form.h"
 #include "rotodom/sequence/times.h"

@@ -74,14 +74,19 @@ TEST(StartComponent, JoinsBlocksOfALongComponent) {
   EXPECT_LT(LargestStartError(blocks->centers, scene), 1.0) << "over 47 m";
 }
 
-// All that one view sees lies far from its axis, where the programs do not look.
+// One view looks along its axis at nothing: all that it sees lies beyond 80 deg, where the programs
+// do not look.
 TEST(StartComponent, PlacesWhatTheProgramsLeaveOutByResection) {
   Scene scene = StreetOf(24);
   const FrameId view{11};
-  KrotOptions options;
-  options.max_off_axis_deg = 25.0;
-  const double least_z = std::cos(options.max_off_axis_deg * kRadFromDeg);
+  const KrotOptions options;
+  const double least_z = std::cos(80.0 * kRadFromDeg);
+  const Rotation turned = Rotation::Exp(90.0 * kRadFromDeg * Eigen::Vector3d::UnitY());
+  scene.cam_from_world.at(view) = turned * scene.cam_from_world.at(view);
   for (Track& track : scene.tracks) {
+    for (Observation& observation : track.observations) {
+      if (observation.frame == view) observation.bearing = turned * observation.bearing;
+    }
     std::erase_if(track.observations, [&](const Observation& observation) {
       return observation.frame == view && observation.bearing.z() >= least_z;
     });

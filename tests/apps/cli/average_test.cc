@@ -14,6 +14,7 @@
 
 #include "output/graph/g2o.h"
 #include "output/graph/rotation_list.h"
+#include "output/graph/rotation_list_file.h"
 #include "tests/apps/command_line.h"
 #include "tests/scenes/wrong_edges.h"
 

@@ -176,7 +176,7 @@ TEST(RotationScaleOf, IsTheMedianOfAcceptedLoopsRightRound) {
   const double factors[] = {1.02, 1.04, 1.01, 9.0, 1.0, 1.03};
   for (std::size_t k = 0; k < loops.size(); ++k) {
     loops[k].accepted = k != 3;
-    loops[k].way.turn_scale = factors[k];  // 1: the loop does not go right round
+    loops[k].scaled.turn_scale = factors[k];  // 1: the loop does not go right round
   }
   loops.pop_back();
   const RotationScale scale = RotationScaleOf(loops);
