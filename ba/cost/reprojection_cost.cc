@@ -106,18 +106,12 @@ void TurnedRotation::Turn(const Eigen::Vector3d& turn) {
   J_turn_ = LeftJacobian(turn);
 }
 
-ReprojectionCost::ReprojectionCost(const Camera& camera,
-                                   const Camera& calibrated,
-                                   const TurnedRotation& rotation,
-                                   const PointShift& shift,
+ReprojectionCost::ReprojectionCost(const ReprojectionState& state,
                                    const Eigen::Vector2d& keypoint_px,
                                    const Eigen::Matrix2d& scale,
                                    double huber_bend,
                                    const ObservationForm& form)
-    : camera_(camera),
-      calibrated_(calibrated),
-      rotation_(rotation),
-      shift_(shift),
+    : state_(state),
       keypoint_px_(keypoint_px),
       scale_(scale),
       huber_bend_(huber_bend),
@@ -140,12 +134,15 @@ bool ReprojectionCost::Evaluate(double const* const* parameters,
                                 double** jacobians) const {
   const Blocks blocks = BlocksOf(form_, parameters, jacobians);
   const Eigen::Map<const Eigen::Vector3d> center(blocks.center);
-  const Eigen::Vector3d point = Eigen::Vector3d::Map(blocks.point) + shift_.shift;
+  const Eigen::Vector3d point = Eigen::Vector3d::Map(blocks.point) + state_.shift.shift;
   ReprojectionJacobian J;
   std::optional<Eigen::Vector2d> pixel;
-  if (!shift_.lost) {
-    pixel = Reproject(
-        camera_, rotation_.Matrix(), center, point, blocks.WantJacobians() ? &J : nullptr);
+  if (!state_.shift.lost) {
+    pixel = Reproject(state_.camera,
+                      state_.rotation.Matrix(),
+                      center,
+                      point,
+                      blocks.WantJacobians() ? &J : nullptr);
   }
   if (!pixel) {
     J.by_rotation.setZero();
@@ -159,7 +156,7 @@ bool ReprojectionCost::Evaluate(double const* const* parameters,
   Eigen::Vector2d::Map(residuals) = robust.value;
   const Eigen::Matrix2d weight = robust.weight * scale_;
   if (blocks.J_turn != nullptr) {
-    const Eigen::Matrix<double, 2, 3> J_turn = J.by_rotation * rotation_.Jacobian();
+    const Eigen::Matrix<double, 2, 3> J_turn = J.by_rotation * state_.rotation.Jacobian();
     ColumnsOf<3>(blocks.J_turn, blocks.camera_stride).noalias() = weight * J_turn;
   }
   if (blocks.J_center != nullptr) {
@@ -170,9 +167,10 @@ bool ReprojectionCost::Evaluate(double const* const* parameters,
   if (blocks.J_lens != nullptr) {
     auto J_lens = ColumnsOf<6>(blocks.J_lens, 6);
     if (pixel) {
-      J_lens.noalias() =
-          weight *
-          LensJacobian(camera_, calibrated_, rotation_.Matrix() * (point - center), *pixel);
+      J_lens.noalias() = weight * LensJacobian(state_.camera,
+                                               state_.calibrated,
+                                               state_.rotation.Matrix() * (point - center),
+                                               *pixel);
     } else {
       J_lens.setZero();
     }

@@ -85,22 +85,22 @@ struct PointShift {
   bool lost = false;  // not to be seen from anywhere
 };
 
+/// What a caller keeps as the parameters say (see ceres::EvaluationCallback), all of it to outlive
+/// the cost function.
+struct ReprojectionState {
+  const Camera& camera;            // with the lens that the parameters say
+  const Camera& calibrated;        // what LensParameters refer to
+  const TurnedRotation& rotation;  // turned as the parameters say
+  const PointShift& shift;         // of the point
+};
+
 /// scale (Project(R_c_w (point + shift - center)) - keypoint_px), under Huber's loss: see
 /// UnderHuberLoss. Its derivatives are what steps are taken with, exact up to the loss' bend.
 class ReprojectionCost final : public ceres::CostFunction {
  public:
-  /// @param camera      with the lens that the parameters say,
-  /// @param rotation    turned as the parameters say: the caller keeps both so (see
-  ///                    ceres::EvaluationCallback).
-  /// @param calibrated  what LensParameters refer to.
-  /// @param shift       of the point.
   /// @param scale       sigmas per pixel: the inverse root of the keypoint's covariance.
   /// @param huber_bend  of Huber's loss, in sigmas; 0: no loss.
-  /// The first four must outlive the cost function.
-  ReprojectionCost(const Camera& camera,
-                   const Camera& calibrated,
-                   const TurnedRotation& rotation,
-                   const PointShift& shift,
+  ReprojectionCost(const ReprojectionState& state,
                    const Eigen::Vector2d& keypoint_px,
                    const Eigen::Matrix2d& scale,
                    double huber_bend = 0.0,
@@ -110,10 +110,7 @@ class ReprojectionCost final : public ceres::CostFunction {
                 double** jacobians) const override;
 
  private:
-  const Camera& camera_;
-  const Camera& calibrated_;
-  const TurnedRotation& rotation_;
-  const PointShift& shift_;
+  ReprojectionState state_;
   Eigen::Vector2d keypoint_px_;
   Eigen::Matrix2d scale_;
   double huber_bend_;

@@ -90,14 +90,12 @@ void AdjustmentProblem::AddObservation(TrackState& track,
   form.camera = cameras_.layout();
   form.at_infinity = track.kind == TrackKind::kDirection;
   form.moves_lens = refine_lens_;
-  costs_.emplace_back(cameras_.camera(),
-                      calibrated_,
-                      cameras_.RotationOf(one.frame),
-                      shift,
-                      observation.keypoint_px,
-                      ScaleOf(state_, one),
-                      huber_bend_,
-                      form);
+  costs_.emplace_back(
+      ReprojectionState{cameras_.camera(), calibrated_, cameras_.RotationOf(one.frame), shift},
+      observation.keypoint_px,
+      ScaleOf(state_, one),
+      huber_bend_,
+      form);
   std::array<double*, 4> blocks;
   int num_blocks = 0;
   if (refine_rotations_) blocks[num_blocks++] = cameras_.Turn(one.frame);

@@ -45,9 +45,7 @@ std::vector<double> NextWeights(const MinimaxProblem& problem,
 
 // @param given  values of fixed views and points.
 // @param before  solution of the previous program.
-MinimaxLpResult SolveProgram(const MinimaxProblem& problem,
-                             double gamma,
-                             const std::vector<double>& weights,
+MinimaxLpResult SolveProgram(const L1SlackProgram& program,
                              double tolerance,
                              const MinimaxStructure* given,
                              const MinimaxStructure* before) {
@@ -57,10 +55,10 @@ MinimaxLpResult SolveProgram(const MinimaxProblem& problem,
   L1InteriorOptions interior;
   interior.tolerance = tolerance;
   if (before != nullptr) interior.first_product = kFirstProductNearby;
-  MinimaxLpResult result = SolveL1SlackInterior(
-      problem, gamma, kDepthPrice, weights, interior, before != nullptr ? before : given);
+  MinimaxLpResult result =
+      SolveL1SlackInterior(program, interior, before != nullptr ? before : given);
   if (result.call == LpCallStatus::kCompleted || given != nullptr) return result;
-  return SolveL1Slack(problem, gamma, kDepthPrice, weights);
+  return SolveL1Slack(program);
 }
 
 // Solves one program. Where it fails, returns false and keeps the previous solution.
@@ -73,7 +71,8 @@ bool SolveRound(const MinimaxProblem& problem,
   const double tolerance = gamma > 0.0 ? 1e-3 : 1e-6;
   const MinimaxStructure* const before =
       start.call == LpCallStatus::kCompleted ? &start.structure : nullptr;
-  MinimaxLpResult lp = SolveProgram(problem, gamma, weights, tolerance, given, before);
+  MinimaxLpResult lp =
+      SolveProgram({problem, gamma, kDepthPrice, weights}, tolerance, given, before);
   ++start.num_programs;
   if (lp.call != LpCallStatus::kCompleted) return false;
   start.call = lp.call;

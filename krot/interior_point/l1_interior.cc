@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <stdexcept>
 #include <utility>
 
 #include <Eigen/Geometry>
@@ -18,15 +17,12 @@ namespace {
 // p - y of s; at the optimum A^T y = 0, y r = 0, z s = 0.
 class Program : public HalfSpaces {
  public:
-  Program(const MinimaxProblem& problem,
-          double gamma,
-          double depth_price,
-          const std::vector<double>& weights)
-      : HalfSpaces(problem, gamma), prices_(problem.observations.size()) {
+  explicit Program(const L1SlackProgram& l1)
+      : HalfSpaces(l1.problem, l1.gamma), prices_(l1.problem.observations.size()) {
     for (int o = 0; o < size(); ++o) {
-      const double weight = weights.empty() ? 1.0 : weights[o];
+      const double weight = l1.weights.empty() ? 1.0 : l1.weights[o];
       prices_[o] = Five::Constant(weight);
-      prices_[o][4] *= depth_price;
+      prices_[o][4] *= l1.depth_price;
     }
   }
 
@@ -273,15 +269,14 @@ Eigen::VectorXd PointsAround(const MinimaxProblem& problem, const StructureLayou
   return x;
 }
 
-LpCallStatus Converge(const MinimaxProblem& problem,
+LpCallStatus Converge(const L1SlackProgram& l1,
                       const Program& program,
-                      double depth_price,
                       const L1InteriorOptions& options,
                       Iterate& at,
                       int& iterations) {
-  StructureSystem system(problem);
+  StructureSystem system(l1.problem);
   for (iterations = 0; iterations < options.max_iterations; ++iterations) {
-    const double enough = options.tolerance * (Objective(program, at) + depth_price);
+    const double enough = options.tolerance * (Objective(program, at) + l1.depth_price);
     const bool balanced = at.imbalance <= options.tolerance;
     if (balanced && Complementarity(at) <= enough) return LpCallStatus::kCompleted;
     if (!NewtonStep(program, system, at)) break;
@@ -291,25 +286,19 @@ LpCallStatus Converge(const MinimaxProblem& problem,
 
 }  // namespace
 
-MinimaxLpResult SolveL1SlackInterior(const MinimaxProblem& problem,
-                                     double gamma,
-                                     double depth_price,
-                                     const std::vector<double>& weights,
+MinimaxLpResult SolveL1SlackInterior(const L1SlackProgram& l1,
                                      const L1InteriorOptions& options,
                                      const MinimaxStructure* start) {
-  RequireProgram(problem, gamma);
-  if (!weights.empty() && weights.size() != problem.observations.size()) {
-    throw std::invalid_argument("L1 slack program: one weight per observation expected");
-  }
+  RequireL1Program(l1);
   MinimaxLpResult result;
   {
     const Stopwatch stopwatch(result.seconds);
-    const Program program(problem, gamma, depth_price, weights);
+    const Program program(l1);
     Iterate at = Start(program,
-                       start == nullptr ? PointsAround(problem, program.layout())
+                       start == nullptr ? PointsAround(l1.problem, program.layout())
                                         : Packed(program.layout(), *start),
                        options.first_product);
-    result.call = Converge(problem, program, depth_price, options, at, result.iterations);
+    result.call = Converge(l1, program, options, at, result.iterations);
     result.structure = Unpacked(program.layout(), at.x);
     result.objective = Objective(program, at);
     result.multipliers.reserve(5 * at.y.size());

@@ -1,7 +1,5 @@
 #pragma once
 
-#include <vector>
-
 #include "krot/structure/minimax_lp.h"
 #include "krot/structure/minimax_problem.h"
 
@@ -20,8 +18,7 @@ struct L1InteriorOptions {
 
 /// Solves the program of SolveL1Slack by a specialised interior-point method, which eliminates the
 /// slacks and points and factors the centres' system.
-/// @param weights  weight of each observation's slack, positive; empty: all one.
-/// @param start    first iterate and the values of fixed views and points; required when there are
+/// @param start  first iterate and the values of fixed views and points; required when there are
 ///                 any. The bound of one on the smallest depth applies to its scale as well.
 /// @return  kCompleted when the tolerance was reached. Multipliers are those of the last iterate.
 ///          Throws std::invalid_argument as SolveL1Slack does.
@@ -29,10 +26,7 @@ struct L1InteriorOptions {
 ///          a good start.
 /// Source:  Mehrotra, On the implementation of a primal-dual interior point method, SIAM J. Opt.
 ///          1992, for variables with an upper bound.
-MinimaxLpResult SolveL1SlackInterior(const MinimaxProblem& problem,
-                                     double gamma,
-                                     double depth_price,
-                                     const std::vector<double>& weights = {},
+MinimaxLpResult SolveL1SlackInterior(const L1SlackProgram& l1,
                                      const L1InteriorOptions& options = {},
                                      const MinimaxStructure* start = nullptr);
 

@@ -23,15 +23,20 @@ LinearProgram DualRows(const StructureLayout& rows) {
   return program;
 }
 
-// Adds the five multiplier columns of every observation, bounded by its cap (empty: unbounded) and
-// the depth multiplier by `depth_price` caps. `budget_row` < 0: no shared budget.
+// Upper bounds of the multipliers.
+struct MultiplierBounds {
+  std::vector<double> caps = {};  // by observation; empty: none
+  double depth_price = 1.0;       // of the depth multiplier, in caps
+  int budget_row = -1;            // row that bounds their sum; negative: none
+};
+
+// Adds the five multiplier columns of every observation.
 void AddMultipliers(const MinimaxProblem& problem,
                     double gamma,
                     const StructureLayout& rows,
-                    int budget_row,
-                    const std::vector<double>& caps,
-                    double depth_price,
+                    const MultiplierBounds& bounds,
                     LinearProgram& program) {
+  const auto& [caps, depth_price, budget_row] = bounds;
   std::vector<std::pair<int, double>> entries;
   for (std::size_t o = 0; o < problem.observations.size(); ++o) {
     const ImageObservation& observation = problem.observations[o];
@@ -141,7 +146,6 @@ Imbalance ComputeImbalance(const MinimaxProblem& problem,
 // instead of 1e-14.)
 bool RepairStep(const MinimaxProblem& problem,
                 const NormalTable& normals,
-                const StructureLayout& rows,
                 const Eigen::VectorXd& imbalance,
                 StructureSystem& system,
                 std::vector<double>& y) {
@@ -152,6 +156,7 @@ bool RepairStep(const MinimaxProblem& problem,
     }
   }
   if (!system.Factor(S)) return false;
+  const StructureLayout rows{problem.num_views(), problem.num_points};
   const Eigen::VectorXd lambda = system.Solve(S, imbalance);
   if (!lambda.allFinite()) return false;
   for (std::size_t o = 0; o < normals.size(); ++o) {
@@ -199,24 +204,27 @@ MinimaxLpResult SolveFeasibility(const MinimaxProblem& problem,
   LinearProgram program = DualRows(rows);
   const int budget_row = program.num_rows();
   program.AddRow(-kInfinity, kSlackPrice);
-  AddMultipliers(problem, gamma, rows, budget_row, {}, 1.0, program);
+  AddMultipliers(problem, gamma, rows, {.budget_row = budget_row}, program);
   return FromDual(SolveLp(program, options), rows);
 }
 
-MinimaxLpResult SolveL1Slack(const MinimaxProblem& problem,
-                             double gamma,
-                             double depth_price,
-                             const std::vector<double>& weights,
-                             const LpOptions& options) {
-  RequireProgram(problem, gamma);
-  if (!weights.empty() && weights.size() != problem.observations.size()) {
+void RequireL1Program(const L1SlackProgram& program) {
+  RequireProgram(program.problem, program.gamma);
+  if (!program.weights.empty() && program.weights.size() != program.problem.observations.size()) {
     throw std::invalid_argument("L1 slack program: one weight per observation expected");
   }
-  const std::vector<double> caps =
-      weights.empty() ? std::vector<double>(problem.observations.size(), 1.0) : weights;
+}
+
+MinimaxLpResult SolveL1Slack(const L1SlackProgram& l1, const LpOptions& options) {
+  RequireL1Program(l1);
+  const MinimaxProblem& problem = l1.problem;
+  MultiplierBounds bounds;
+  bounds.caps = l1.weights;
+  if (bounds.caps.empty()) bounds.caps.assign(problem.observations.size(), 1.0);
+  bounds.depth_price = l1.depth_price;
   const StructureLayout rows{problem.num_views(), problem.num_points};
   LinearProgram program = DualRows(rows);
-  AddMultipliers(problem, gamma, rows, -1, caps, depth_price, program);
+  AddMultipliers(problem, l1.gamma, rows, bounds, program);
   return FromDual(SolveLp(program, options), rows);
 }
 
@@ -249,7 +257,7 @@ bool CertifiesInfeasible(const MinimaxProblem& problem,
     for (std::size_t o = 0; o < normals.size(); ++o) depth_sum += y[5 * o + 4];
     if (depth_sum > 2.0 * max_extent * imbalance.Bound()) return true;
     if (round == kMaxRepairs) return false;
-    if (!RepairStep(problem, normals, rows, imbalance.sum, system, y)) return false;
+    if (!RepairStep(problem, normals, imbalance.sum, system, y)) return false;
   }
 }
 

@@ -48,14 +48,20 @@ MinimaxLpResult SolveFeasibility(const MinimaxProblem& problem,
                                  double gamma,
                                  const LpOptions& options = {});
 
-/// L1 program for the robust start: the minimum of the sum of slacks of the half-spaces, with
-/// slacks of the depth bound weighted by `depth_price`. Only outliers have slack.
-/// @param weights  weight of each observation's slack, positive; empty: all one.
-MinimaxLpResult SolveL1Slack(const MinimaxProblem& problem,
-                             double gamma,
-                             double depth_price,
-                             const std::vector<double>& weights = {},
-                             const LpOptions& options = {});
+/// L1 program for the robust start: the minimum of the sum of slacks of the half-spaces. Only
+/// outliers have slack.
+struct L1SlackProgram {
+  const MinimaxProblem& problem;
+  double gamma = 0.0;                // image bound, normalised
+  double depth_price = 1.0;          // weight of the slack of depth bounds
+  std::vector<double> weights = {};  // of each observation's slack, positive; empty: all one
+};
+
+/// Throws std::invalid_argument where RequireProgram does, and unless there is one weight per
+/// observation or none.
+void RequireL1Program(const L1SlackProgram& program);
+
+MinimaxLpResult SolveL1Slack(const L1SlackProgram& program, const LpOptions& options = {});
 
 /// Lower bounds exclude structures up to this many times their smallest depth, as large as a
 /// kilometre to a millimetre.

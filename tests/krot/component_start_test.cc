@@ -107,9 +107,7 @@ TEST(StartComponent, IsNothingWithoutTracks) {
   const KrotUnits units(options, scene.camera);
   const std::vector<Track> tracks;
   EXPECT_FALSE(
-      StartComponent(
-          {scene.cam_from_world, tracks, options, units}, component, {})
-          .has_value());
+      StartComponent({scene.cam_from_world, tracks, options, units}, component, {}).has_value());
 }
 
 }  // namespace

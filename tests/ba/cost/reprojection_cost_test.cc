@@ -92,7 +92,7 @@ class FollowingCost final : public ceres::CostFunction {
         camera_(calibrated),
         rotation_(kStart),
         form_(form),
-        cost_(camera_, calibrated_, rotation_, kShift, kKeypoint_px, kScale, 0.0, form) {
+        cost_({camera_, calibrated_, rotation_, kShift}, kKeypoint_px, kScale, 0.0, form) {
     set_num_residuals(cost_.num_residuals());
     *mutable_parameter_block_sizes() = cost_.parameter_block_sizes();
   }
@@ -332,10 +332,7 @@ TEST(ReprojectionCost, PointBehindTheCameraOrLostCostsButDoesNotPull) {
   const TurnedRotation rotation{Rotation()};
   for (const bool lost : {false, true}) {
     const PointShift shift = {Eigen::Vector3d::Zero(), lost};
-    const ReprojectionCost cost(camera,
-                                camera,
-                                rotation,
-                                shift,
+    const ReprojectionCost cost({camera, camera, rotation, shift},
                                 {600.0, 200.0},
                                 0.5 * Eigen::Matrix2d::Identity(),
                                 0.0,

@@ -32,12 +32,11 @@ class StreetProblem {
       double* const point = scene_.truth.point_in_world.at(track.id).data();
       points_.push_back(point);
       for (const Observation& observation : track.observations) {
-        costs_.emplace_back(scene_.camera,
-                            scene_.camera,
-                            rotations_[observation.frame.value],
-                            no_shift_,
-                            observation.keypoint_px,
-                            Eigen::Matrix2d::Identity() / observation.sigma_px);
+        costs_.emplace_back(
+            ReprojectionState{
+                scene_.camera, scene_.camera, rotations_[observation.frame.value], no_shift_},
+            observation.keypoint_px,
+            Eigen::Matrix2d::Identity() / observation.sigma_px);
         problem_.AddResidualBlock(
             &costs_.back(), &loss_, poses_[observation.frame.value].data(), point);
       }

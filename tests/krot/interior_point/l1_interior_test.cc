@@ -17,8 +17,8 @@ TEST(SolveL1SlackInterior, AgreesWithTheLpEngine) {
       options.noise_px = 0.5;
       options.outlier_ratio = 0.05;
       const MinimaxProblem problem = ProblemFromScene(MakeScene(options));
-      const MinimaxLpResult expected = SolveL1Slack(problem, gamma, 10.0);
-      const MinimaxLpResult result = SolveL1SlackInterior(problem, gamma, 10.0);
+      const MinimaxLpResult expected = SolveL1Slack({problem, gamma, 10.0});
+      const MinimaxLpResult result = SolveL1SlackInterior({problem, gamma, 10.0});
       ASSERT_EQ(result.call, LpCallStatus::kCompleted);
       EXPECT_NEAR(result.objective, expected.objective, 1e-4 * expected.objective);
     }
@@ -34,8 +34,8 @@ TEST(SolveL1SlackInterior, PricesOfObservationsCount) {
   for (std::size_t o = 0; o < problem.observations.size(); ++o) {
     weights.push_back(o % 3 == 0 ? 1e-3 : 1.0);
   }
-  const MinimaxLpResult expected = SolveL1Slack(problem, 1.0 / 700.0, 5.0, weights);
-  const MinimaxLpResult result = SolveL1SlackInterior(problem, 1.0 / 700.0, 5.0, weights);
+  const MinimaxLpResult expected = SolveL1Slack({problem, 1.0 / 700.0, 5.0, weights});
+  const MinimaxLpResult result = SolveL1SlackInterior({problem, 1.0 / 700.0, 5.0, weights});
   ASSERT_EQ(result.call, LpCallStatus::kCompleted);
   EXPECT_NEAR(result.objective, expected.objective, 1e-4 * expected.objective);
   // Multipliers between nothing and the price, as the dual program wants them.
@@ -56,17 +56,17 @@ TEST(SolveL1SlackInterior, IsSoonerDoneFromTheAnswerAtOtherPrices) {
   scene.outlier_ratio = 0.05;
   const MinimaxProblem problem = ProblemFromScene(MakeScene(scene));
   const double gamma = 1.0 / 700.0;
-  const MinimaxLpResult before = SolveL1SlackInterior(problem, gamma, 10.0);
+  const MinimaxLpResult before = SolveL1SlackInterior({problem, gamma, 10.0});
   std::vector<double> weights;
   for (const ImageObservation& observation : problem.observations) {
     const double excess = BoxResidual(problem, before.structure, observation) / gamma;
     weights.push_back(excess > 1.01 ? 0.05 : 0.2);
   }
-  const MinimaxLpResult expected = SolveL1SlackInterior(problem, gamma, 10.0, weights);
+  const MinimaxLpResult expected = SolveL1SlackInterior({problem, gamma, 10.0, weights});
   L1InteriorOptions options;
   options.first_product = 1e-3;
   const MinimaxLpResult result =
-      SolveL1SlackInterior(problem, gamma, 10.0, weights, options, &before.structure);
+      SolveL1SlackInterior({problem, gamma, 10.0, weights}, options, &before.structure);
   ASSERT_EQ(result.call, LpCallStatus::kCompleted);
   EXPECT_NEAR(result.objective, expected.objective, 1e-4 * expected.objective);
   EXPECT_LT(result.iterations, expected.iterations);
@@ -74,7 +74,7 @@ TEST(SolveL1SlackInterior, IsSoonerDoneFromTheAnswerAtOtherPrices) {
 
 TEST(SolveL1SlackInterior, DoesNotTakeSmallProductsForAnAnswer) {
   const MinimaxProblem problem = ProblemFromScene(MakeScene({.noise_px = 0.5}));
-  const MinimaxLpResult expected = SolveL1SlackInterior(problem, 0.0, 10.0);
+  const MinimaxLpResult expected = SolveL1SlackInterior({problem, 0.0, 10.0});
   // A hundred times too large: what it misses outweighs the products at once.
   MinimaxStructure start = expected.structure;
   for (Eigen::Vector3d& center : start.center_in_world) center *= 100.0;
@@ -82,7 +82,7 @@ TEST(SolveL1SlackInterior, DoesNotTakeSmallProductsForAnAnswer) {
   L1InteriorOptions options;
   options.first_product = 1e-9;
   options.max_iterations = 500;
-  const MinimaxLpResult result = SolveL1SlackInterior(problem, 0.0, 10.0, {}, options, &start);
+  const MinimaxLpResult result = SolveL1SlackInterior({problem, 0.0, 10.0}, options, &start);
   if (result.call == LpCallStatus::kCompleted) {
     EXPECT_NEAR(result.objective, expected.objective, 1e-4 * expected.objective);
   }
@@ -90,9 +90,9 @@ TEST(SolveL1SlackInterior, DoesNotTakeSmallProductsForAnAnswer) {
 
 TEST(SolveL1SlackInterior, RefusesWhatIsNoProgram) {
   const MinimaxProblem problem = ProblemFromScene(MakeScene({}));
-  EXPECT_THROW(SolveL1SlackInterior(problem, -1.0, 1.0), std::invalid_argument);
-  EXPECT_THROW(SolveL1SlackInterior(problem, 0.01, 1.0, {1.0, 2.0}), std::invalid_argument);
-  EXPECT_THROW(SolveL1SlackInterior({}, 0.01, 1.0), std::invalid_argument);
+  EXPECT_THROW(SolveL1SlackInterior({problem, -1.0, 1.0}), std::invalid_argument);
+  EXPECT_THROW(SolveL1SlackInterior({problem, 0.01, 1.0, {1.0, 2.0}}), std::invalid_argument);
+  EXPECT_THROW(SolveL1SlackInterior({MinimaxProblem(), 0.01, 1.0}), std::invalid_argument);
 }
 
 }  // namespace
