@@ -3,20 +3,11 @@
 #include <algorithm>
 #include <cmath>
 
+#include "krot/initialisation/robust_triangulation.h"
 #include "rotodom/types/splitmix64.h"
 
 namespace rotslam {
 namespace {
-
-std::vector<int> Inliers(const std::vector<PosedRay>& rays,
-                         const Eigen::Vector3d& center,
-                         double threshold) {
-  std::vector<int> inliers;
-  for (std::size_t k = 0; k < rays.size(); ++k) {
-    if (BearingError(rays[k], center) <= threshold) inliers.push_back(static_cast<int>(k));
-  }
-  return inliers;
-}
 
 // Point half-way between two lines; nullopt when they are parallel.
 std::optional<Eigen::Vector3d> Midpoint(const PosedRay& a, const PosedRay& b) {
@@ -67,7 +58,7 @@ std::optional<Resection> ResectCenter(const std::vector<PosedRay>& rays,
     if (a == b) continue;
     const auto center = Midpoint(rays[a], rays[b]);
     if (!center) continue;
-    std::vector<int> inliers = Inliers(rays, *center, options.threshold_rad);
+    std::vector<int> inliers = InliersOf(rays, *center, options.threshold_rad);
     if (inliers.size() <= best.size()) continue;
     best = std::move(inliers);
     best_center = *center;
@@ -80,7 +71,7 @@ std::optional<Resection> ResectCenter(const std::vector<PosedRay>& rays,
   for (int round = 0; round < 2; ++round) {
     const auto refined = Refine(rays, best, best_center, options.threshold_rad);
     if (!refined) return std::nullopt;
-    std::vector<int> inliers = Inliers(rays, *refined, options.threshold_rad);
+    std::vector<int> inliers = InliersOf(rays, *refined, options.threshold_rad);
     if (inliers.size() < best.size() / 2 || inliers.size() < 3) break;
     best_center = *refined;
     best = std::move(inliers);
