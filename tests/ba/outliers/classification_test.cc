@@ -42,7 +42,7 @@ TEST(ClassifyAll, LooksForPointsAgainThatAStepHasThrownBehindTheCameras) {
         return any.kind == TrackKind::kPoint;
       });
   const Eigen::Vector3d position = track.position;
-  const FrameState& frame = scene.state.frames[track.sights.front().frame];
+  const FrameState& frame = scene.state.frames[track.observations.front().frame];
   track.position = 2.0 * scene.state.centers[frame.center] - position;
   ClassifyAll(scene.options.fine, Placement::kStays, scene.options, scene.state);
   EXPECT_EQ(scene.NumPoints(), num_points - 1);

@@ -24,7 +24,8 @@ class StrayPointsTest : public testing::Test {
         });
     stray_ = static_cast<std::size_t>(point - state_.tracks.begin());
     start_ = point->position;
-    behind_ = 2.0 * state_.centers[state_.frames[point->sights.front().frame].center] - start_;
+    behind_ =
+        2.0 * state_.centers[state_.frames[point->observations.front().frame].center] - start_;
   }
 
   // Where the state's cameras stand, moved.
@@ -106,7 +107,8 @@ TEST_F(StrayPointsTest, LosesAPointThatHasNoPlaceAndFindsItAgain) {
 
 // Observations that never fitted are no reason to move a point.
 TEST_F(StrayPointsTest, LeavesAPointThatIsSeenAsBadlyAsBefore) {
-  state_.tracks[stray_].sights.front().bearing = -state_.tracks[stray_].sights.front().bearing;
+  state_.tracks[stray_].observations.front().bearing =
+      -state_.tracks[stray_].observations.front().bearing;
   StrayPoints strays(state_, 0.0, 1);
   strays.Start(Poses());
   strays.Try(Poses());
