@@ -15,6 +15,7 @@
 #include "apps/cli/command.h"
 #include "apps/cli/input/run_options.h"
 #include "apps/cli/run_directory/run_directory.h"
+#include "apps/cli/run_directory/summary_parts.h"
 #include "apps/cli/terminal/describe.h"
 #include "apps/cli/terminal/progress.h"
 #include "apps/slam/map/refinement.h"
