@@ -279,7 +279,7 @@ function buildFigures(parent) {
 
 const kStages = [['focal_guess', []], ['orientations', ['pyramid', 'tracking', 'detection', 'edges', 'averaging', 'covariance', 'loop_description',
   'loop_candidates', 'loop_verification', 'global_averaging']],
-['positions', ['known_rotation', 'bundle_adjustment', 'bundle_bridge', 'bundle_coarse', 'bundle_lens', 'bundle_fine', 'bundle_close']]];
+['positions', ['known_rotation', 'bundle_adjustment', 'bundle_fixed_rotation', 'bundle_coarse', 'bundle_lens', 'bundle_fine', 'bundle_final']]];
 
 function buildTimes(parent) {
   const seconds = Object.assign({}, summary.seconds);

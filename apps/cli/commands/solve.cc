@@ -214,7 +214,10 @@ int Solve(const SolveFlags& flags) {
 
   progress.StartStage("bundle adjustment", -1);
   const RefinedComponents refined =
-      RefineComponents(input.cam_from_world, krot, input.tracks, {}, input.camera, options.ba);
+      RefineComponents({input.cam_from_world, krot.center_in_world, input.tracks},
+                       krot.component,
+                       input.camera,
+                       options.ba);
   const std::vector<std::size_t> order = BySize(refined);
   if (order.empty()) {
     throw std::runtime_error(flags.input + ": bundle adjustment found no usable map");

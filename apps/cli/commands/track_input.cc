@@ -16,9 +16,10 @@ namespace {
 
 // Finds the focal length of an input whose camera is a guess; of another one nothing. A request to
 // stop ends the program meanwhile: nothing is lost yet.
-void RefineGuess(TrackedInput& tracked) {
+// @return  seconds since the start.
+double RefineGuess(TrackedInput& tracked) {
   Input& input = tracked.input;
-  if (!input.guess) return;
+  if (!input.guess) return SecondsSince(tracked.start);
   SlamProgress observer(tracked.options, tracked.interruption, tracked.progress);
   const EndAtInterruption end_at_interruption(tracked.interruption, [&] {
     tracked.progress.Warn("interrupted while the focal length is sought: nothing is written yet");
@@ -35,6 +36,7 @@ void RefineGuess(TrackedInput& tracked) {
                 estimate.camera.fx);
   tracked.progress.Say(estimate.is_found ? line.data()
                                          : "focal length: nothing tells it, the guess stands");
+  return SecondsSince(tracked.start);
 }
 
 Orientations TrackFrames(TrackedInput& tracked, bool keep_features) {
@@ -67,7 +69,7 @@ TrackedInput::TrackedInput(const std::string& command,
           flags.input, options.sequence, [this](const std::string& line) { progress.Say(line); })),
       vocabulary(OpenVocabulary(flags.input)),
       directory(PrepareRunDirectory(flags.input.out)),
-      guess_s((RefineGuess(*this), SecondsSince(start))),
+      guess_s(RefineGuess(*this)),
       checkpoint(directory,
                  flags.checkpoint,
                  IdentityOf(command, input, flags.input, options, flags.common.seed),
