@@ -3,12 +3,14 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <iterator>
 #include <limits>
 #include <utility>
 
 #include <Eigen/Geometry>
 
 #include "apps/report/axes.h"
+#include "apps/report/stage_figures.h"
 #include "rotodom/types/text_file.h"
 
 namespace rotslam {
@@ -360,6 +362,8 @@ std::vector<Figure> MakeFigures(const RunData& run) {
   figures.push_back({"orientation", OrientationFigure(run)});
   if (run.truth) figures.push_back({"errors", ErrorFigure(run)});
   figures.push_back({"runtime", RuntimeFigure(run)});
+  std::vector<Figure> of_stages = MakeStageFigures(run);
+  std::move(of_stages.begin(), of_stages.end(), std::back_inserter(figures));
   return figures;
 }
 
