@@ -18,7 +18,7 @@ solve() {  # <name> <sequence> <options...>: a run, unless one that is newer tha
   if [[ ! $work/$name/summary.json -nt $rotslam ]]; then
     "$rotslam" run "$sequence" --out "$work/$name" --quiet "$@"
   fi
-  "$rotslam" plot "$work/$name" --out "$work/$name/plots" --quiet
+  "$rotslam" plot "$work/$name" --out "$work/$name/plots" --dpi 100 --quiet
 }
 
 simulate() {  # <name> <kind> <options...>
@@ -31,7 +31,7 @@ simulate() {  # <name> <kind> <options...>
 }
 
 keep() {  # <run> <figure> <picture>
-  cp "$work/$1/plots/$2.svg" "$images/$3.svg"
+  cp "$work/$1/plots/$2.${3##*.}" "$images/$3"
 }
 
 photograph() {  # <run> <picture>: the top of its report
@@ -39,38 +39,38 @@ photograph() {  # <run> <picture>: the top of its report
     echo "no chromium: $images/$2.jpg is kept as it is"
     return
   fi
-  chromium --headless --no-sandbox --hide-scrollbars --use-gl=swiftshader --enable-unsafe-swiftshader \
-    --window-size=1280,1500 --virtual-time-budget=20000 --screenshot="$work/$2.png" \
-    "file://$PWD/$work/$1/report.html" >/dev/null 2>&1
-  ffmpeg -loglevel error -y -i "$work/$2.png" -vf scale=960:-2 -q:v 7 "$images/$2.jpg"
+  sed "s|$PWD/||g" "$work/$1/report.html" >"$work/$2.html"
+  chromium --headless --no-sandbox --hide-scrollbars --enable-unsafe-swiftshader --window-size=1360,1300 \
+    --virtual-time-budget=20000 --screenshot="$work/$2.png" "file://$PWD/$work/$2.html" >/dev/null 2>&1
+  ffmpeg -loglevel error -y -i "$work/$2.png" -vf scale=1000:-2 -q:v 8 "$images/$2.jpg"
 }
 
 simulate gimbal gimbal
-keep gimbal relative_rotations relative_rotations
-keep gimbal averaging averaging
-keep gimbal motion pure_rotation
-keep gimbal trajectory component_alignment
-keep gimbal registration frame_registration
+keep gimbal relative_rotations relative_rotations.svg
+keep gimbal averaging averaging.svg
+keep gimbal motion pure_rotation.svg
+keep gimbal trajectory component_alignment.svg
+keep gimbal registration frame_registration.svg
 photograph gimbal report_gimbal
 
 simulate street street --color
-keep street tracks tracks
-keep street keyframes keyframes
-keep street known_rotation known_rotation
-keep street residuals bundle_adjustment
+keep street tracks tracks.svg
+keep street keyframes keyframes.svg
+keep street known_rotation known_rotation.svg
+keep street residuals bundle_adjustment.svg
 
 simulate rolling_shutter handheld --readout 0.02
-keep rolling_shutter rolling_shutter rolling_shutter
+keep rolling_shutter rolling_shutter rolling_shutter.svg
 simulate motion_blur gimbal --blur 8 --shutter 0.02
-keep motion_blur motion_blur motion_blur
+keep motion_blur motion_blur motion_blur.svg
 
 if [[ -d $data/euroc_v101_keyframes ]]; then
   printf 'relocalisation: {enabled: false}\n' >"$work/uncorrected.yaml"
   solve corrected "$data/euroc_v101_keyframes"
-  keep corrected view_graph loop_closure
+  keep corrected view_graph loop_closure.svg
   solve uncorrected "$data/euroc_v101_keyframes" --config "$work/uncorrected.yaml"
-  keep corrected trajectory map_corrected
-  keep uncorrected trajectory map_uncorrected
+  keep corrected trajectory map_corrected.png
+  keep uncorrected trajectory map_uncorrected.png
 fi
 if [[ -d $data/kitti00 ]]; then
   solve kitti "$data/kitti00"
