@@ -247,7 +247,7 @@ function buildKrot(parent) {
   if (krot.message) rows.push(['', krot.message]);
   rows.push(['γ, normalised', `${significant(krot.gamma_low, 5)} … ${significant(krot.gamma_high, 5)}`]);
   rows.push(['γ, px', `${significant(krot.gamma_low_px, 5)} … ${significant(krot.gamma_high_px, 5)}`]);
-  rows.push(['sightings left out', whole(krot.removed)]);
+  rows.push(['observations left out', whole(krot.removed)]);
   if (krot.programs !== undefined) rows.push(['linear programs', whole(krot.programs)]);
   const element = panel(parent, 'Known rotation: the least possible largest residual lies between');
   if (krot.gamma_high_px !== null && krot.gamma_high_px > 0) {
