@@ -149,7 +149,7 @@ Drawing TracksFigure(const RunData& run) {
   Drawing drawing(kPageWidth, bottom + 12.0);
   drawing.AddText({12.0, 15.0},
                   "frame " + std::to_string(shown) +
-                      ": features, and their ways through eight frames before and behind",
+                      ": features, and their paths through eight frames before and behind",
                   {TextAnchor::kStart, 9.0, false, false, kInk});
   Points dots;
   const std::size_t step = most->size() / kMaxPaths + 1;
