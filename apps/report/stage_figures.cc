@@ -15,7 +15,7 @@
 namespace rotslam {
 namespace {
 
-using Points = std::vector<Eigen::Vector2d>;
+using PlotPoints = std::vector<Eigen::Vector2d>;
 
 constexpr Color kFirst = {0.10, 0.36, 0.72, 0.8};
 constexpr Color kSecond = {0.85, 0.41, 0.05, 0.9};
@@ -30,7 +30,7 @@ constexpr std::size_t kMaxDots = 1500;  // of one series, so that a figure stays
 
 struct Series {
   std::string name;  // for the legend; empty: not in it
-  Points points;
+  PlotPoints points;
   Color color;
   double dot_size = 0.0;  // 0: a line through the points
 };
@@ -46,9 +46,9 @@ struct Panel {
 
 double PageHeight(const Panel& last) { return last.top + last.height + 32.0; }
 
-Points AtMost(std::size_t limit, const Points& points) {
+PlotPoints AtMost(std::size_t limit, const PlotPoints& points) {
   const std::size_t step = points.size() / (limit + 1) + 1;
-  Points chosen;
+  PlotPoints chosen;
   for (std::size_t k = 0; k < points.size(); k += step) chosen.push_back(points[k]);
   return chosen;
 }
@@ -70,7 +70,7 @@ void DrawPanel(const Panel& panel, const std::vector<Series>& all_series, Drawin
   double legend_x = kMarginLeft;
   for (const Series& series : all_series) {
     if (series.dot_size > 0.0) {
-      Points dots;
+      PlotPoints dots;
       for (const Eigen::Vector2d& point : AtMost(kMaxDots, series.points)) {
         dots.push_back(axes.OnPage(point));
       }
@@ -109,9 +109,9 @@ double Quantile(std::vector<double> values, double share) {
 }
 
 // Share of the values below each of them, up to `end`, in 200 steps.
-Points Distribution(std::vector<double> values, double end) {
+PlotPoints Distribution(std::vector<double> values, double end) {
   std::sort(values.begin(), values.end());
-  Points curve;
+  PlotPoints curve;
   for (int k = 0; k <= 200; ++k) {
     const double x = end * k / 200.0;
     const auto below = std::upper_bound(values.begin(), values.end(), x) - values.begin();
@@ -151,10 +151,10 @@ Drawing TracksFigure(const RunData& run) {
                   "frame " + std::to_string(shown) +
                       ": features, and their paths through eight frames before and behind",
                   {TextAnchor::kStart, 9.0, false, false, kInk});
-  Points dots;
+  PlotPoints dots;
   const std::size_t step = most->size() / kMaxPaths + 1;
   for (std::size_t k = 0; k < most->size(); k += step) {
-    Points path;
+    PlotPoints path;
     for (const Observation& observation : run.cloud->tracks[(*most)[k]].track.observations) {
       if (std::abs(observation.frame.value - shown) > kReach) continue;
       path.emplace_back(12.0 + scale * observation.keypoint_px.x(),
@@ -201,7 +201,7 @@ EdgeErrors FindEdgeErrors(const RunData& run) {
 }
 
 Drawing RelativeRotationsFigure(const RunData& run, const EdgeErrors& errors) {
-  Points dots;
+  PlotPoints dots;
   const double highest = Quantile(errors.measured_deg, 0.99);
   for (std::size_t k = 0; k < errors.frames.size(); ++k) {
     if (errors.measured_deg[k] > highest) continue;
@@ -225,7 +225,7 @@ Drawing AveragingFigure(const EdgeErrors& errors) {
 }
 
 Drawing ViewGraphFigure(const RunData& run) {
-  Points edges, refused, accepted;
+  PlotPoints edges, refused, accepted;
   for (const RelativeRotation& edge : run.edges) edges.emplace_back(edge.i.value, edge.j.value);
   for (const LoopRow& loop : run.loops) {
     (loop.accepted ? accepted : refused).emplace_back(loop.match, loop.frame);
@@ -243,7 +243,7 @@ Drawing ViewGraphFigure(const RunData& run) {
 
 // What the camera does from each frame to the next; pure rotation is shaded.
 Drawing MotionFigure(const RunData& run) {
-  Points steps, angles;
+  PlotPoints steps, angles;
   for (int n = 1; n < run.NumFrames(); ++n) {
     const double seconds = SecondsOf(run, n);
     steps.emplace_back(seconds,
@@ -270,7 +270,7 @@ Drawing MotionFigure(const RunData& run) {
 
 Drawing KeyframesFigure(const RunData& run) {
   const std::vector<std::vector<int>> tracks = TracksOfFrames(*run.cloud, run.NumFrames());
-  Points shares, keyframes;
+  PlotPoints shares, keyframes;
   const std::vector<int>* last = nullptr;
   for (const MapFrame& frame : run.cloud->frames) {
     if (!IsFrame(run, frame.id)) continue;
@@ -295,10 +295,10 @@ Drawing KeyframesFigure(const RunData& run) {
 }
 
 // Residuals of the observations that bundle adjustment kept, px.
-Points Residuals(const RunMap& map) {
+PlotPoints Residuals(const RunMap& map) {
   std::map<FrameId, const MapFrame*> frames;
   for (const MapFrame& frame : map.frames) frames[frame.id] = &frame;
-  Points residuals;
+  PlotPoints residuals;
   for (const MapTrack& track : map.tracks) {
     if (!track.point_in_world) continue;
     for (std::size_t k = 0; k < track.track.observations.size(); ++k) {
@@ -313,12 +313,12 @@ Points Residuals(const RunMap& map) {
   return residuals;
 }
 
-Drawing ResidualsFigure(const Points& residuals) {
+Drawing ResidualsFigure(const PlotPoints& residuals) {
   std::vector<double> sizes;
   for (const Eigen::Vector2d& residual : residuals)
     sizes.push_back(residual.lpNorm<Eigen::Infinity>());
   const double reach = Quantile(sizes, 0.99);
-  Points shown;
+  PlotPoints shown;
   for (const Eigen::Vector2d& residual : residuals) {
     if (residual.lpNorm<Eigen::Infinity>() <= reach) shown.push_back(residual);
   }
@@ -331,7 +331,7 @@ Drawing ResidualsFigure(const Points& residuals) {
 }
 
 // The bracket of the least possible largest residual, and the residuals after bundle adjustment.
-Drawing KnownRotationFigure(const Points& residuals, const std::array<double, 2>& bracket_px) {
+Drawing KnownRotationFigure(const PlotPoints& residuals, const std::array<double, 2>& bracket_px) {
   std::vector<double> sizes;
   for (const Eigen::Vector2d& residual : residuals)
     sizes.push_back(residual.lpNorm<Eigen::Infinity>());
@@ -350,7 +350,7 @@ Drawing KnownRotationFigure(const Points& residuals, const std::array<double, 2>
 }
 
 Drawing RegistrationFigure(const RunData& run) {
-  Points angles, keyframes;
+  PlotPoints angles, keyframes;
   for (const MapFrame& frame : run.cloud->frames) {
     if (!IsFrame(run, frame.id)) continue;
     const int n = frame.id.value;
@@ -370,7 +370,7 @@ Drawing RegistrationFigure(const RunData& run) {
 // How far the middle of the image moves in `seconds` by rotation, px.
 Drawing MotionWithinFrame(const RunData& run, double seconds, const std::string& name) {
   const double focal_px = run.summary.at("camera").at("fx").get<double>();
-  Points lengths;
+  PlotPoints lengths;
   for (int n = 1; n + 1 < run.NumFrames(); ++n) {
     const Eigen::Vector3d turn = EstimateOf(run, FrameId{n + 1}, FrameId{n - 1}).Log();
     const double rate = turn.head<2>().norm() / (SecondsOf(run, n + 1) - SecondsOf(run, n - 1));
@@ -396,7 +396,7 @@ void AddMapFigures(const RunData& run, std::vector<Figure>& figures) {
     if (run.HasPositions()) figures.push_back({"registration", RegistrationFigure(run)});
   }
   if (!run.keyframe_map) return;
-  const Points residuals = Residuals(*run.keyframe_map);
+  const PlotPoints residuals = Residuals(*run.keyframe_map);
   if (residuals.empty()) return;
   const double high_px = SummaryNumber(run, "krot", "gamma_high_px");
   if (high_px > 0.0) {
