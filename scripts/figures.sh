@@ -18,7 +18,7 @@ solve() {  # <name> <sequence> <options...>: a run, unless one that is newer tha
   if [[ ! $work/$name/summary.json -nt $rotslam ]]; then
     "$rotslam" run "$sequence" --out "$work/$name" --quiet "$@"
   fi
-  "$rotslam" plot "$work/$name" --out "$work/$name/plots" --dpi 100 --quiet
+  "$rotslam" plot "$work/$name" --out "$work/$name/plots" --dpi 72 --quiet
 }
 
 simulate() {  # <name> <kind> <options...>
