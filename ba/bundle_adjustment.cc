@@ -122,7 +122,7 @@ class Rounds {
 
   // Classifies and minimises until classification changes next to nothing.
   // @param placement  where points are looked for the first time; from then on near where they are.
-  void Close(BundleRound round, Placement placement, BundleState& state) {
+  void RunFinal(BundleRound round, Placement placement, BundleState& state) {
     // Few observations have changed: a step or two.
     constexpr double kEasier = 10.0;
     // Classification has settled when it changes less than this share of the observations.
@@ -139,7 +139,7 @@ class Rounds {
       const auto total = static_cast<double>(std::count(after.begin(), after.end(), true));
       if (k > 0 && static_cast<double>(changed) <= kMaxChangedShare * total) return;
       if (k == 2) round.function_tolerance *= kEasier;
-      Minimise("close", round, start, state);
+      Minimise("final", round, start, state);
     }
   }
 
@@ -325,7 +325,7 @@ BundleResult RefineBundle(const BundleProblem& problem,
   std::optional<BundleState> part;
   if (in_part) part = WithSomeTracks(state, options.preparing_observations);
   BundleState& preparing = part ? *part : state;
-  rounds.Run("bridge", options.bridge, preparing);
+  rounds.Run("fixed_rotation", options.fixed_rotation, preparing);
   rounds.Run("coarse", options.coarse, preparing);
   preparing.has_motion_blur = ShowsMotionBlur(preparing);
   rounds.TryLens(options.coarse, preparing);
@@ -341,16 +341,16 @@ BundleResult RefineBundle(const BundleProblem& problem,
     rounds.Run("completed", options.coarse, preparing);
     rounds.Run("completed", rounds.FineFor(preparing), preparing);
   }
-  const BundleRound close = rounds.Narrow(preparing);
+  const BundleRound final_round = rounds.Narrow(preparing);
   if (part) TakeCameras(*part, options.num_threads, state);
-  rounds.Close(close, part ? Placement::kAnywhere : Placement::kNearby, state);
+  rounds.RunFinal(final_round, part ? Placement::kAnywhere : Placement::kNearby, state);
 
   BundleSummary& summary = result.summary;
   for (const BundleRoundSummary& round : summary.rounds) summary.iterations += round.iterations;
   if (!summary.rounds.empty()) {
     const auto whole = std::find_if(
         summary.rounds.begin(), summary.rounds.end(), [&](const BundleRoundSummary& round) {
-          return round.name == (in_part ? "close" : "fine");
+          return round.name == (in_part ? "final" : "fine");
         });
     const auto first = whole == summary.rounds.end() ? summary.rounds.begin() : whole;
     summary.initial_cost = first->initial_cost;

@@ -31,22 +31,22 @@ PureRotationResult RefinePureRotation(const Camera& camera,
     problem.start.center_in_world[frame] = Eigen::Vector3d::Zero();
     if (frame != first) problem.shared_center[frame] = first;
   }
-  BundleOptions turning = options;
+  BundleOptions rotating = options;
   // Rotations averaged under a wrong lens are several pixels off: nothing is left out at first, and
   // the loss keeps what does not fit from carrying them away.
-  turning.bridge.refine_rotations = true;
-  turning.bridge.loss = RobustLoss::kCauchy;
-  turning.find_covariance = false;
+  rotating.fixed_rotation.refine_rotations = true;
+  rotating.fixed_rotation.loss = RobustLoss::kCauchy;
+  rotating.find_covariance = false;
   // Explanations are compared at the same loss and limit.
-  turning.loss_spreads = 0.0;
-  turning.limit_spreads = 0.0;
-  LensOptions& lens = turning.lens;
+  rotating.loss_spreads = 0.0;
+  rotating.limit_spreads = 0.0;
+  LensOptions& lens = rotating.lens;
   if (lens.refine_distortion || lens.refine_focal) {
     lens.refine_focal = true;
     lens.focal_sigma = std::max(lens.focal_sigma, kFocalSigma);
   }
   lens.min_gain = std::max(lens.min_gain, kMinLensGain);
-  const BundleResult refined = RefineBundle(problem, turning);
+  const BundleResult refined = RefineBundle(problem, rotating);
   result.status = refined.status;
   result.cam_from_world = refined.reconstruction.cam_from_world;
   result.camera = refined.camera;

@@ -87,9 +87,7 @@ RotationalOdometry::RotationalOdometry(const Camera& camera,
   if (const auto problem = options.Problem()) throw std::invalid_argument("options: " + *problem);
 }
 
-FrameEstimate RotationalOdometry::AddFrame(FrameId frame,
-                                           double timestamp_s,
-                                           const cv::Mat& image) {
+void RotationalOdometry::CheckNext(FrameId frame, double timestamp_s, const cv::Mat& image) const {
   if (!cam_from_world_.empty() && frame <= cam_from_world_.rbegin()->first) {
     throw std::invalid_argument("RotationalOdometry: frame ids must ascend");
   }
@@ -100,6 +98,12 @@ FrameEstimate RotationalOdometry::AddFrame(FrameId frame,
   if (sized && !image.empty() && (image.cols != camera_.width || image.rows != camera_.height)) {
     throw std::invalid_argument("RotationalOdometry: the image has not the camera's size");
   }
+}
+
+FrameEstimate RotationalOdometry::AddFrame(FrameId frame,
+                                           double timestamp_s,
+                                           const cv::Mat& image) {
+  CheckNext(frame, timestamp_s, image);
   FrameEstimate estimate;
   estimate.frame = frame;
   estimate.timestamp_s = timestamp_s;
@@ -250,7 +254,7 @@ RotationalOdometry::Agreement RotationalOdometry::AgreementOf(
       }
     }
     const auto estimate =
-        EstimateRelativeRotation(pairs,
+        EstimateRelativeRotation({pairs},
                                  tracked.cam_from_world * views[v].cam_from_world.Inverse(),
                                  camera_.MeanFocal(),
                                  options_.relative_rotation,
@@ -462,18 +466,18 @@ void RotationalOdometry::MeasureExposure() {
   if (!options_.tracking.match_blur || recent_.empty()) return;
   const Stopwatch stopwatch(seconds_.tracking);
   const auto time_s = [&](FrameId frame) { return timestamps_s_.at(frame); };
-  const auto turning = [&](const View& view) -> std::optional<RotatingView> {
+  const auto rotating = [&](const View& view) -> std::optional<RotatingView> {
     const FrameId frame = view.features.frame;
     const auto rate = RateOf(frame, cam_from_world_, time_s, kFarthestFrameForBlur_s);
     if (!rate) return std::nullopt;
     return RotatingView{{&view, cam_from_world_.at(frame)}, *rate};
   };
-  const auto newest = turning(*recent_.front());
+  const auto newest = rotating(*recent_.front());
   if (!newest) return;
   std::optional<RotatingView> most_different;
   double largest = 0.0;
   for (const std::shared_ptr<View>& view : recent_) {
-    const auto other = turning(*view);
+    const auto other = rotating(*view);
     if (!other || !ExposureMeter::IsInformative(other->rate, newest->rate, camera_.MeanFocal()))
       continue;
     const double difference = std::abs(other->rate.norm() - newest->rate.norm());

@@ -123,6 +123,8 @@ class RotationalOdometry {
   std::optional<Eigen::Matrix3d> CovarianceBetween(FrameId i, FrameId j) const;
 
  private:
+  // Throws std::invalid_argument where the frame cannot follow those before.
+  void CheckNext(FrameId frame, double timestamp_s, const cv::Mat& image) const;
   ImagePyramid BuildPyramidOf(const cv::Mat& image);
   Rotation PredictOrientation(double timestamp_s) const;
   // Of a frame after all others, at the mean rate since the one before. Drawing that out to the

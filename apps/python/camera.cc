@@ -23,6 +23,7 @@ std::size_t NumCoefficients(CameraModel model) {
   return std::max<std::size_t>(5, DistortionNames(model).size());
 }
 
+// Ten parameters: the keyword arguments of Python's Camera().
 Camera MakeCamera(double fx,
                   double fy,
                   double cx,

@@ -51,6 +51,7 @@ NamedTrajectory TrajectoryFrom(const char* argument,
   return result;
 }
 
+// Nine parameters: the keyword arguments of rotslam.evaluate.
 py::object EvaluateTrajectory(const py::object& ground_truth,
                               const py::object& estimate,
                               const py::object& times,

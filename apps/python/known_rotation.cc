@@ -104,6 +104,7 @@ py::dict Describe(const KrotSolution& solution, int num_views) {
                   "removed"_a = removed);
 }
 
+// Nine parameters: the keyword arguments of rotslam.solve_known_rotation.
 py::dict Solve(const py::object& cam_from_world,
                const py::object& view,
                const py::object& track,

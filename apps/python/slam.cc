@@ -273,6 +273,7 @@ std::unique_ptr<SequenceSource> OpenSource(const py::object& sequence) {
   return std::make_unique<SequenceSource>(path, options);
 }
 
+// Six parameters: the keyword arguments of rotslam.run.
 std::unique_ptr<PyResult> Run(const py::object& sequence,
                               const std::optional<Camera>& given_camera,
                               const py::object& given_options,
@@ -304,6 +305,7 @@ std::unique_ptr<PyResult> Run(const py::object& sequence,
 
 }  // namespace
 
+// A table: one entry for each property of Result, then rotslam.run.
 void AddSlam(py::module_& module) {
   py::class_<PyResult>(module, "Result", "What rotslam.run has found.")
       .def_property_readonly(

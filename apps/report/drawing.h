@@ -81,4 +81,9 @@ class Drawing {
   std::vector<std::variant<Line, Area, Dots, Text>> shapes_;
 };
 
+struct Figure {
+  std::string name;  // of its files, without ending
+  Drawing drawing;
+};
+
 }  // namespace rotslam

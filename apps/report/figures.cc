@@ -3,12 +3,14 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <iterator>
 #include <limits>
 #include <utility>
 
 #include <Eigen/Geometry>
 
 #include "apps/report/axes.h"
+#include "apps/report/stage_figures.h"
 #include "rotodom/types/text_file.h"
 
 namespace rotslam {
@@ -125,15 +127,17 @@ std::vector<Eigen::Vector2d> Projected(const std::vector<Eigen::Vector3d>& point
   return projected;
 }
 
+// The side from which a map is drawn: the world's axes across and up, and what they are called.
+struct MapSide {
+  std::array<int, 2> axes = {};
+  std::array<std::string, 2> labels;
+};
+
 // The range of the axes is that of the path and a margin; points of the cloud outside are left out.
 // @return  whether any point of the cloud is drawn.
-bool DrawMap(const RunData& run,
-             const Paths& paths,
-             std::array<int, 2> axes_of_map,
-             const std::array<std::string, 2>& labels,
-             Axes axes,
-             Drawing& drawing) {
-  const auto [across, up] = axes_of_map;
+bool DrawMap(
+    const RunData& run, const Paths& paths, const MapSide& side, Axes axes, Drawing& drawing) {
+  const auto [across, up] = side.axes;
   const std::vector<Eigen::Vector2d> estimate = Projected(paths.estimate, across, up);
   const std::vector<Eigen::Vector2d> truth = Projected(paths.truth, across, up);
   Eigen::AlignedBox2d path;
@@ -143,7 +147,7 @@ bool DrawMap(const RunData& run,
   axes.Include(path.min() - margin);
   axes.Include(path.max() + margin);
   axes.Settle(/*equal_scale=*/true);
-  axes.DrawFrame(labels[0], labels[1], drawing);
+  axes.DrawFrame(side.labels[0], side.labels[1], drawing);
   std::vector<Eigen::Vector2d> dots;
   for (const Eigen::Vector2d& point : Projected(paths.cloud, across, up)) {
     if (axes.Contains(point)) dots.push_back(axes.OnPage(point));
@@ -166,14 +170,12 @@ Drawing TrajectoryFigure(const RunData& run) {
   const Paths paths = LevelPaths(run);
   const bool has_dots_above = DrawMap(run,
                                       paths,
-                                      {0, 1},
-                                      {"right", "forward, from above"},
+                                      {{0, 1}, {"right", "forward, from above"}},
                                       Axes({kLeft, 24.0, kPlotWidth, 320.0}),
                                       drawing);
   const bool has_dots_aside = DrawMap(run,
                                       paths,
-                                      {1, 2},
-                                      {"forward", "up, from the side"},
+                                      {{1, 2}, {"forward", "up, from the side"}},
                                       Axes({kLeft, 384.0, kPlotWidth, 138.0}),
                                       drawing);
   std::vector<LegendEntry> legend = {{"estimate", kMeasured}};
@@ -197,8 +199,7 @@ struct Curve {
 };
 
 void DrawCurves(const std::vector<Curve>& curves,
-                const std::string& x_label,
-                const std::string& y_label,
+                const std::array<std::string, 2>& labels,
                 bool band_around_zero,
                 Axes axes,
                 Drawing& drawing) {
@@ -215,7 +216,7 @@ void DrawCurves(const std::vector<Curve>& curves,
     }
   }
   axes.Settle(/*equal_scale=*/false);
-  axes.DrawFrame(x_label, y_label, drawing);
+  axes.DrawFrame(labels[0], labels[1], drawing);
   for (const Curve& curve : curves) {
     std::vector<Eigen::Vector2d> outline;
     for (const double side : {1.0, -1.0}) {
@@ -269,8 +270,7 @@ Drawing OrientationFigure(const RunData& run) {
       }
     }
     DrawCurves(curves,
-               angle == 2 ? "time, s" : "",
-               kNames[angle],
+               {angle == 2 ? "time, s" : "", kNames[angle]},
                false,
                Axes({kLeft, 24.0 + 122.0 * angle, kPlotWidth, 110.0}),
                drawing);
@@ -296,8 +296,7 @@ Drawing ErrorFigure(const RunData& run) {
       curve.half_widths.push_back(SigmaOf(row, angle));
     }
     DrawCurves({curve},
-               angle == 2 && !has_positions ? "time, s" : "",
-               kNames[angle],
+               {angle == 2 && !has_positions ? "time, s" : "", kNames[angle]},
                true,
                Axes({kLeft, 24.0 + 122.0 * angle, kPlotWidth, 110.0}),
                drawing);
@@ -309,7 +308,7 @@ Drawing ErrorFigure(const RunData& run) {
     curve.points.emplace_back(SecondsAt(run, truth.frames[k]), truth.position_error_m[k]);
   }
   DrawCurves(
-      {curve}, "time, s", "position, m", false, Axes({kLeft, 390.0, kPlotWidth, 110.0}), drawing);
+      {curve}, {"time, s", "position, m"}, false, Axes({kLeft, 390.0, kPlotWidth, 110.0}), drawing);
   return drawing;
 }
 
@@ -360,6 +359,8 @@ std::vector<Figure> MakeFigures(const RunData& run) {
   figures.push_back({"orientation", OrientationFigure(run)});
   if (run.truth) figures.push_back({"errors", ErrorFigure(run)});
   figures.push_back({"runtime", RuntimeFigure(run)});
+  std::vector<Figure> of_stages = MakeStageFigures(run);
+  std::move(of_stages.begin(), of_stages.end(), std::back_inserter(figures));
   return figures;
 }
 

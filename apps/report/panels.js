@@ -247,7 +247,7 @@ function buildKrot(parent) {
   if (krot.message) rows.push(['', krot.message]);
   rows.push(['γ, normalised', `${significant(krot.gamma_low, 5)} … ${significant(krot.gamma_high, 5)}`]);
   rows.push(['γ, px', `${significant(krot.gamma_low_px, 5)} … ${significant(krot.gamma_high_px, 5)}`]);
-  rows.push(['sightings left out', whole(krot.removed)]);
+  rows.push(['observations left out', whole(krot.removed)]);
   if (krot.programs !== undefined) rows.push(['linear programs', whole(krot.programs)]);
   const element = panel(parent, 'Known rotation: the least possible largest residual lies between');
   if (krot.gamma_high_px !== null && krot.gamma_high_px > 0) {
@@ -279,7 +279,7 @@ function buildFigures(parent) {
 
 const kStages = [['focal_guess', []], ['orientations', ['pyramid', 'tracking', 'detection', 'edges', 'averaging', 'covariance', 'loop_description',
   'loop_candidates', 'loop_verification', 'global_averaging']],
-['positions', ['known_rotation', 'bundle_adjustment', 'bundle_bridge', 'bundle_coarse', 'bundle_lens', 'bundle_fine', 'bundle_close']]];
+['positions', ['known_rotation', 'bundle_adjustment', 'bundle_fixed_rotation', 'bundle_coarse', 'bundle_lens', 'bundle_fine', 'bundle_final']]];
 
 function buildTimes(parent) {
   const seconds = Object.assign({}, summary.seconds);

@@ -41,6 +41,85 @@ double RampedStep(double x, double ramp) {
   return rate * ramp * y * y * y * (1.0 - 0.5 * y);
 }
 
+// Heading of a camera, rad.
+struct Angles {
+  double yaw = 0.0;
+  double pitch = 0.0;
+  double roll = 0.0;
+};
+
+// Progress along a way over [0, 1]: constant speed, then over the last third down to rest.
+double Arrive(double x) {
+  constexpr double kBrake = 0.35;
+  const double full = 1.0 / (1.0 - 0.5 * kBrake);
+  if (x <= 1.0 - kBrake) return full * x;
+  const double y = std::min(1.0, (1.0 - x) / kBrake);
+  return 1.0 - full * kBrake * y * y * y * (1.0 - 0.5 * y);
+}
+
+// A camera that translates, stops, turns in place, and translates on.
+struct GimbalMotion {
+  double stop_s = 0.0;
+  double go_s = 0.0;
+  double leave_s = 0.0;  // from `go_s` to the end
+  Angles turn;           // in place
+  double arm_m = 0.0;    // from the axis of the turn to the camera's centre
+
+  StampedPose PoseAt(double time_s) const {
+    const Vector3d stop(0.15, -1.5, -0.3);
+    Vector3d axis_in_world = stop;
+    Angles angles{kYawBefore, -0.12, 0.0};
+    if (time_s < stop_s) {
+      const Vector3d start(-1.05, -1.62, -0.55);
+      const double x = time_s / stop_s;
+      axis_in_world = start + Arrive(x) * (stop - start);
+      // The hand's sway ends before the stop.
+      Sway(time_s, SmoothStep((1.0 - x) / 0.6), angles, axis_in_world);
+    } else {
+      Turn((time_s - stop_s) / (go_s - stop_s), angles);
+    }
+    if (time_s > go_s) {
+      const double x = (time_s - go_s) / leave_s;
+      axis_in_world += (1.0 - Arrive(1.0 - x)) * WayOnwards();
+      Sway(time_s, SmoothStep(x / 0.6), angles, axis_in_world);
+    }
+    StampedPose pose;
+    pose.timestamp_s = time_s;
+    pose.world_from_cam = Heading(angles.yaw, angles.pitch, angles.roll);
+    pose.center_in_world = axis_in_world;
+    if (arm_m != 0.0) pose.center_in_world += pose.world_from_cam * Vector3d(0.0, 0.0, arm_m);
+    return pose;
+  }
+
+ private:
+  static constexpr double kYawBefore = 0.12;
+
+  // Across the view after the turn, backing off a little, over the same length at any turn.
+  Vector3d WayOnwards() const {
+    const double yaw_after = kYawBefore + turn.yaw;
+    return 0.95 * Vector3d(std::cos(yaw_after), 0.0, -std::sin(yaw_after)) -
+           0.30 * Vector3d(std::sin(yaw_after), 0.0, std::cos(yaw_after)) +
+           Vector3d(0.0, -0.1, 0.0);
+  }
+
+  void Turn(double x, Angles& angles) const {
+    const double turned = RampedStep(x, 0.25);
+    angles.yaw += turn.yaw * turned;
+    angles.pitch += turn.pitch * turned;
+    angles.roll += turn.roll * turned;
+    angles.pitch += 0.10 * (SmoothStep(x / 0.5) - SmoothStep(x / 0.5 - 1.0));
+    angles.roll += 0.05 * (SmoothStep(x / 0.4) - SmoothStep((x - 0.6) / 0.4));
+  }
+
+  // The hand that carries the camera, at `strength` 0 to 1.
+  static void Sway(double time_s, double strength, Angles& angles, Vector3d& place) {
+    place.y() += 0.04 * strength * std::sin(kTwoPi * 0.9 * time_s);
+    angles.yaw += 0.05 * strength * std::sin(kTwoPi * 0.45 * time_s);
+    angles.pitch += 0.03 * strength * std::sin(kTwoPi * 0.6 * time_s + 1.0);
+    angles.roll += 0.03 * strength * std::sin(kTwoPi * 0.5 * time_s + 2.0);
+  }
+};
+
 }  // namespace
 
 const char* Name(MotionKind kind) {
@@ -91,79 +170,24 @@ CameraPath GimbalPath(const GimbalPathOptions& options) {
   const int num_frames = options.num_frames;
   const int first_rotating = static_cast<int>(std::lround(0.3 * num_frames));
   const int last_rotating = num_frames - first_rotating - 1;
-  // The stops lie half a frame outside the turning frames, so that rounding of times cannot matter.
-  const double stop_s = (first_rotating - 0.5) / options.fps;
-  const double go_s = (last_rotating + 0.5) / options.fps;
-  const double end_s = (num_frames - 1) / options.fps;
-
   CameraPath path;
   path.fps = options.fps;
   path.num_frames = num_frames;
   path.segments = {{0, first_rotating - 1, MotionKind::kTranslating},
                    {first_rotating, last_rotating, MotionKind::kRotating},
                    {last_rotating + 1, num_frames - 1, MotionKind::kTranslating}};
-  const double yaw_before = 0.12;
   const auto turn_about = [&](TurnAxis axis) {
     return options.axis == axis ? options.turn_deg * kRadFromDeg : 0.0;
   };
-  const double yaw_turn = turn_about(TurnAxis::kYaw);
-  const double pitch_turn = turn_about(TurnAxis::kPitch);
-  const double roll_turn = turn_about(TurnAxis::kRoll);
-  const double arm = options.lever_arm_m;
-  path.at = [=](double time_s) {
-    const Vector3d start(-1.05, -1.62, -0.55);
-    const Vector3d stop(0.15, -1.5, -0.3);
-    // Onwards across the new view, backing off a little, over the same length at any turn.
-    const double yaw_after = yaw_before + yaw_turn;
-    const Vector3d onwards = 0.95 * Vector3d(std::cos(yaw_after), 0.0, -std::sin(yaw_after)) -
-                             0.30 * Vector3d(std::sin(yaw_after), 0.0, std::cos(yaw_after)) +
-                             Vector3d(0.0, -0.1, 0.0);
-    // Progress along the first way: constant speed, then over the last third down to rest.
-    const auto arrive = [](double x) {
-      constexpr double kBrake = 0.35;
-      const double full = 1.0 / (1.0 - 0.5 * kBrake);
-      if (x <= 1.0 - kBrake) return full * x;
-      const double y = std::min(1.0, (1.0 - x) / kBrake);
-      return 1.0 - full * kBrake * y * y * y * (1.0 - 0.5 * y);
-    };
-    StampedPose pose;
-    pose.timestamp_s = time_s;
-    double yaw = yaw_before;
-    double pitch = -0.12;
-    double roll = 0.0;
-    Vector3d axis_in_world = stop;
-    if (time_s < stop_s) {
-      const double x = time_s / stop_s;
-      axis_in_world = start + arrive(x) * (stop - start);
-      const double calm = SmoothStep((1.0 - x) / 0.6);  // the hand's sway ends before the stop
-      axis_in_world.y() += 0.04 * calm * std::sin(kTwoPi * 0.9 * time_s);
-      yaw += 0.05 * calm * std::sin(kTwoPi * 0.45 * time_s);
-      pitch += 0.03 * calm * std::sin(kTwoPi * 0.6 * time_s + 1.0);
-      roll += 0.03 * calm * std::sin(kTwoPi * 0.5 * time_s + 2.0);
-    } else {
-      const double x = (time_s - stop_s) / (go_s - stop_s);
-      const double turned = RampedStep(x, 0.25);
-      yaw += yaw_turn * turned;
-      pitch += pitch_turn * turned;
-      roll += roll_turn * turned;
-      pitch += 0.10 * (SmoothStep(x / 0.5) - SmoothStep(x / 0.5 - 1.0));
-      roll += 0.05 * (SmoothStep(x / 0.4) - SmoothStep((x - 0.6) / 0.4));
-    }
-    if (time_s > go_s) {
-      const double leave_s = end_s - go_s + 0.5 / options.fps;
-      const double x = (time_s - go_s) / leave_s;
-      axis_in_world += (1.0 - arrive(1.0 - x)) * onwards;
-      const double stir = SmoothStep(x / 0.6);
-      axis_in_world.y() += 0.04 * stir * std::sin(kTwoPi * 0.9 * time_s);
-      yaw += 0.05 * stir * std::sin(kTwoPi * 0.45 * time_s);
-      pitch += 0.03 * stir * std::sin(kTwoPi * 0.6 * time_s + 1.0);
-      roll += 0.03 * stir * std::sin(kTwoPi * 0.5 * time_s + 2.0);
-    }
-    pose.world_from_cam = Heading(yaw, pitch, roll);
-    pose.center_in_world = axis_in_world;
-    if (arm != 0.0) pose.center_in_world += pose.world_from_cam * Vector3d(0.0, 0.0, arm);
-    return pose;
-  };
+  GimbalMotion motion;
+  // The stops lie half a frame outside the turning frames, so that rounding of times cannot matter.
+  motion.stop_s = (first_rotating - 0.5) / options.fps;
+  motion.go_s = (last_rotating + 0.5) / options.fps;
+  motion.leave_s = (num_frames - 1) / options.fps - motion.go_s + 0.5 / options.fps;
+  motion.turn = {
+      turn_about(TurnAxis::kYaw), turn_about(TurnAxis::kPitch), turn_about(TurnAxis::kRoll)};
+  motion.arm_m = options.lever_arm_m;
+  path.at = [motion](double time_s) { return motion.PoseAt(time_s); };
   return path;
 }
 

@@ -312,12 +312,10 @@ PixelRays::PixelRays(const Camera& camera) : width_(camera.width), height_(camer
   }
 }
 
-cv::Mat RenderFrame(const World& world,
-                    const std::vector<MovingBox>& moving,
+cv::Mat RenderFrame(const Scenery& scenery,
                     const PixelRays& rays,
                     const std::function<StampedPose(double)>& pose_at,
-                    double time_s,
-                    int frame,
+                    const FrameInstant& instant,
                     const RenderOptions& options) {
   if (const auto problem = options.Problem()) throw std::invalid_argument("render: " + *problem);
   const int width = rays.Width();
@@ -326,16 +324,16 @@ cv::Mat RenderFrame(const World& world,
                           Colour::Zero());
   const int count = options.blur_subframes;
   for (int k = 0; k < count; ++k) {
-    const double instant_s = time_s + options.shutter_s * ((k + 0.5) / count - 0.5);
-    const Scene scene(world, moving, instant_s);
+    const double instant_s = instant.time_s + options.shutter_s * ((k + 0.5) / count - 0.5);
+    const Scene scene(scenery.world, scenery.moving, instant_s);
     std::vector<StampedPose> poses;
     for (const double late_s : rays.ExposureTimes()) poses.push_back(pose_at(instant_s + late_s));
     ViewRenderer(scene, rays, poses, options).AddTo(sum, 1.0f / static_cast<float>(count));
   }
-  const auto gain = static_cast<float>(255.0 * Gain(options, time_s));
+  const auto gain = static_cast<float>(255.0 * Gain(options, instant.time_s));
   const auto noise = static_cast<float>(options.noise_grey);
   const int channels = options.color ? 3 : 1;
-  const std::uint64_t key = HashBits(options.seed, frame, 43);
+  const std::uint64_t key = HashBits(options.seed, instant.frame, 43);
   cv::Mat image(height, width, CV_8UC(channels));
   for (int y = 0; y < height; ++y) {
     std::uint8_t* row = image.ptr<std::uint8_t>(y);

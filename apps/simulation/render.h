@@ -80,21 +80,26 @@ class PixelRays {
   std::vector<Eigen::Vector3d> corners_;
 };
 
-/// Renders the image of the camera at a time, which is mid-frame with a rolling shutter; moving
-/// boxes stand still during the readout.
-/// @param pose_at  pose as a function of time; evaluated at `time_s` and, with blur or a rolling
+struct Scenery {
+  const World& world;
+  const std::vector<MovingBox>& moving;
+};
+
+struct FrameInstant {
+  double time_s = 0.0;  // mid-frame with a rolling shutter
+  int frame = 0;        // number of the picture; determines its noise together with the seed
+};
+
+/// Renders the image of the camera at an instant; moving boxes stand still during the readout.
+/// @param pose_at  pose as a function of time; evaluated at the instant and, with blur or a rolling
 ///                 shutter, around it.
-/// @param frame    number of the picture; determines its noise together with options.seed.
 /// @return  CV_8UC1, or CV_8UC3 with options.color. A pure function of its arguments.
 /// Cost:    two to three tenths of a microsecond a pixel and sub-frame, one ray and about one
-/// texture
-///          sample; more where surfaces meet.
-cv::Mat RenderFrame(const World& world,
-                    const std::vector<MovingBox>& moving,
+///          texture sample; more where surfaces meet.
+cv::Mat RenderFrame(const Scenery& scenery,
                     const PixelRays& rays,
                     const std::function<StampedPose(double)>& pose_at,
-                    double time_s,
-                    int frame,
+                    const FrameInstant& instant,
                     const RenderOptions& options);
 
 }  // namespace rotslam

@@ -6,34 +6,14 @@
 namespace rotslam {
 namespace {
 
+using Eigen::Vector2d;
 using Eigen::Vector3d;
 
 constexpr double kHalfX = 3.0;
 constexpr double kHalfZ = 2.25;
 constexpr double kHeight = 2.7;
 
-// Hands out materials, each with a seed of its own.
-class Painter {
- public:
-  explicit Painter(std::uint64_t seed) : seed_(HashBits(seed, 17, 3)) {}
-
-  Material Paint(Pattern pattern, float tone, float contrast = 1.0f) {
-    Material material;
-    material.pattern = pattern;
-    material.seed = HashBits(seed_, ++count_, 5);
-    material.tone = tone;
-    material.contrast = contrast;
-    return material;
-  }
-  // A number in [low, high).
-  double Draw(double low, double high) {
-    return low + (high - low) * UnitFrom(HashBits(seed_, ++count_, 6), 0, 24);
-  }
-
- private:
-  std::uint64_t seed_;
-  std::int64_t count_ = 0;
-};
+Painter PainterOf(std::uint64_t seed) { return Painter(HashBits(seed, 17, 3), {5, 6}); }
 
 void AddTable(std::vector<Surface>& surfaces,
               Painter& painter,
@@ -59,9 +39,10 @@ void AddTable(std::vector<Surface>& surfaces,
 void AddClutter(std::vector<Surface>& surfaces,
                 Painter& painter,
                 const Vector3d& center,
-                double extent_x,
-                double extent_z,
+                const Vector2d& extent,
                 int count) {
+  const double extent_x = extent.x();
+  const double extent_z = extent.y();
   constexpr Pattern kPatterns[] = {
       Pattern::kPoster, Pattern::kPanel, Pattern::kFabric, Pattern::kPoster, Pattern::kTiles};
   for (int k = 0; k < count; ++k) {
@@ -81,15 +62,23 @@ void AddClutter(std::vector<Surface>& surfaces,
   }
 }
 
-// Posters and frames in one row of a wall. `along` runs right as one looks at the wall.
+// A wall: its left lower corner as one looks at it, its lower edge, and its normal.
+struct Wall {
+  Vector3d foot;
+  Vector3d along;
+  Vector3d into_room;
+};
+
+// Posters and frames in one row of a wall.
+// @param heights  of the row's lower and upper end.
 void AddPosters(std::vector<Surface>& surfaces,
                 Painter& painter,
-                const Vector3d& foot,
-                const Vector3d& along,
-                const Vector3d& into_room,
-                double low,
-                double high,
+                const Wall& wall,
+                const Vector2d& heights,
                 int count) {
+  const auto& [foot, along, into_room] = wall;
+  const double low = heights.x();
+  const double high = heights.y();
   const double length = along.norm();
   const Vector3d direction = along / length;
   for (int k = 0; k < count; ++k) {
@@ -106,39 +95,40 @@ void AddPosters(std::vector<Surface>& surfaces,
   }
 }
 
-}  // namespace
+const Vector3d kCorner(-kHalfX, 0.0, -kHalfZ);
+const Vector3d kEdgeX(2.0 * kHalfX, 0.0, 0.0);
+const Vector3d kEdgeZ(0.0, 0.0, 2.0 * kHalfZ);
 
-World MakeRoom(std::uint64_t seed) {
-  Painter painter(seed);
-  std::vector<Surface> surfaces;
+// Floor, ceiling, walls and a carpet. Wall edges run right as one looks at them from inside.
+void AddShell(std::vector<Surface>& surfaces, Painter& painter) {
   const Vector3d up(0.0, -kHeight, 0.0);
-  const Vector3d x_edge(2.0 * kHalfX, 0.0, 0.0);
-  const Vector3d z_edge(0.0, 0.0, 2.0 * kHalfZ);
-  const Vector3d corner(-kHalfX, 0.0, -kHalfZ);
-
-  // The shell. Wall edges run right as one looks at them from inside.
-  surfaces.push_back(MakeQuad(corner, x_edge, z_edge, painter.Paint(Pattern::kPlanks, 0.45f)));
+  surfaces.push_back(MakeQuad(kCorner, kEdgeX, kEdgeZ, painter.Paint(Pattern::kPlanks, 0.45f)));
   surfaces.push_back(
-      MakeQuad(corner + up, x_edge, z_edge, painter.Paint(Pattern::kTiles, 0.68f, 0.7f)));
+      MakeQuad(kCorner + up, kEdgeX, kEdgeZ, painter.Paint(Pattern::kTiles, 0.68f, 0.7f)));
   surfaces.push_back(
-      MakeQuad(corner + z_edge, x_edge, up, painter.Paint(Pattern::kPlaster, 0.60f)));
+      MakeQuad(kCorner + kEdgeZ, kEdgeX, up, painter.Paint(Pattern::kPlaster, 0.60f)));
   surfaces.push_back(
-      MakeQuad(corner + x_edge + z_edge, -z_edge, up, painter.Paint(Pattern::kBricks, 0.52f)));
+      MakeQuad(kCorner + kEdgeX + kEdgeZ, -kEdgeZ, up, painter.Paint(Pattern::kBricks, 0.52f)));
   surfaces.push_back(
-      MakeQuad(corner + x_edge, -x_edge, up, painter.Paint(Pattern::kPlaster, 0.50f)));
-  surfaces.push_back(MakeQuad(corner, z_edge, up, painter.Paint(Pattern::kTiles, 0.56f)));
+      MakeQuad(kCorner + kEdgeX, -kEdgeX, up, painter.Paint(Pattern::kPlaster, 0.50f)));
+  surfaces.push_back(MakeQuad(kCorner, kEdgeZ, up, painter.Paint(Pattern::kTiles, 0.56f)));
   surfaces.push_back(MakeQuad({-1.3, -0.012, -1.0},
                               {2.4, 0.0, 0.0},
                               {0.0, 0.0, 1.7},
                               painter.Paint(Pattern::kFabric, 0.45f)));
+}
 
-  // What hangs on the walls.
-  AddPosters(surfaces, painter, corner + z_edge, x_edge, {0.0, 0.0, -1.0}, 1.25, 2.4, 6);
-  AddPosters(surfaces, painter, corner + x_edge + z_edge, -z_edge, {-1.0, 0.0, 0.0}, 1.3, 2.4, 4);
-  AddPosters(surfaces, painter, corner + x_edge, -x_edge, {0.0, 0.0, 1.0}, 1.1, 2.3, 5);
-  AddPosters(surfaces, painter, corner, z_edge, {1.0, 0.0, 0.0}, 1.2, 2.35, 4);
+// What hangs on the walls.
+void AddPosters(std::vector<Surface>& surfaces, Painter& painter) {
+  AddPosters(surfaces, painter, {kCorner + kEdgeZ, kEdgeX, {0.0, 0.0, -1.0}}, {1.25, 2.4}, 6);
+  AddPosters(
+      surfaces, painter, {kCorner + kEdgeX + kEdgeZ, -kEdgeZ, {-1.0, 0.0, 0.0}}, {1.3, 2.4}, 4);
+  AddPosters(surfaces, painter, {kCorner + kEdgeX, -kEdgeX, {0.0, 0.0, 1.0}}, {1.1, 2.3}, 5);
+  AddPosters(surfaces, painter, {kCorner, kEdgeZ, {1.0, 0.0, 0.0}}, {1.2, 2.35}, 4);
+}
 
-  // Furniture along the walls; the middle stays free for the camera.
+// Furniture along the walls; the middle stays free for the camera.
+void AddFurniture(std::vector<Surface>& surfaces, Painter& painter) {
   const Material shelf = painter.Paint(Pattern::kShelf, 0.5f);
   const Material shelf_top = painter.Paint(Pattern::kPlanks, 0.5f);
   AddBox(surfaces, {{-2.2, 0.0, 2.05}, {1.2, 2.0, 0.36}, 0.0, shelf, shelf_top});
@@ -147,12 +137,12 @@ World MakeRoom(std::uint64_t seed) {
       {{2.82, 0.0, 1.2}, {0.34, 1.85, 1.1}, 0.0, painter.Paint(Pattern::kShelf, 0.48f), shelf_top});
   const Material cabinet = painter.Paint(Pattern::kPanel, 0.6f);
   AddBox(surfaces, {{2.65, 0.0, -1.35}, {0.6, 1.15, 1.3}, 0.0, cabinet, cabinet});
-  AddClutter(surfaces, painter, {2.65, -1.15, -1.35}, 0.5, 1.1, 2);
+  AddClutter(surfaces, painter, {2.65, -1.15, -1.35}, {0.5, 1.1}, 2);
   const Material drawers = painter.Paint(Pattern::kPanel, 0.45f);
   AddBox(
       surfaces,
       {{-2.7, 0.0, -1.4}, {0.55, 0.8, 1.4}, 0.0, drawers, painter.Paint(Pattern::kPlanks, 0.6f)});
-  AddClutter(surfaces, painter, {-2.7, -0.8, -1.4}, 0.5, 1.2, 2);
+  AddClutter(surfaces, painter, {-2.7, -0.8, -1.4}, {0.5, 1.2}, 2);
   const Material sofa = painter.Paint(Pattern::kFabric, 0.5f);
   AddBox(surfaces, {{0.2, 0.0, 1.75}, {1.9, 0.42, 0.8}, 0.0, sofa, sofa});
   AddBox(surfaces, {{0.2, -0.42, 2.08}, {1.9, 0.45, 0.2}, 0.0, sofa, sofa});
@@ -161,12 +151,15 @@ World MakeRoom(std::uint64_t seed) {
     AddBox(surfaces,
            {{x, -0.42, 1.85}, {0.4, 0.36, 0.16}, painter.Draw(-0.4, 0.4), cushion, cushion});
   }
+}
+
+void AddTablesAndSeats(std::vector<Surface>& surfaces, Painter& painter) {
   AddTable(surfaces, painter, {-0.6, 0.0, -1.85}, {1.6, 0.74, 0.7}, 0.0);
-  AddClutter(surfaces, painter, {-0.6, -0.74, -1.85}, 1.5, 0.6, 5);
+  AddClutter(surfaces, painter, {-0.6, -0.74, -1.85}, {1.5, 0.6}, 5);
   AddTable(surfaces, painter, {0.1, 0.0, 0.75}, {0.9, 0.42, 0.5}, 0.12);
-  AddClutter(surfaces, painter, {0.1, -0.42, 0.75}, 0.8, 0.4, 3);
+  AddClutter(surfaces, painter, {0.1, -0.42, 0.75}, {0.8, 0.4}, 3);
   AddTable(surfaces, painter, {1.2, 0.0, -1.85}, {1.1, 0.74, 0.65}, -0.05);
-  AddClutter(surfaces, painter, {1.2, -0.74, -1.85}, 1.0, 0.5, 4);
+  AddClutter(surfaces, painter, {1.2, -0.74, -1.85}, {1.0, 0.5}, 4);
   const Vector3d seats[] = {{-1.0, 0.0, -1.25}, {1.3, 0.0, -1.2}, {-2.3, 0.0, 0.4}};
   for (const Vector3d& seat : seats) {
     const double yaw = painter.Draw(-0.7, 0.7);
@@ -179,7 +172,10 @@ World MakeRoom(std::uint64_t seed) {
             back,
             back});
   }
-  // Crates in the corners and against the walls, and a standing lamp.
+}
+
+// Crates in the corners and against the walls, and a standing lamp.
+void AddCrates(std::vector<Surface>& surfaces, Painter& painter) {
   const struct {
     double x, z, size, yaw;
   } crates[] = {{1.7, 1.95, 0.5, 0.2},
@@ -200,6 +196,18 @@ World MakeRoom(std::uint64_t seed) {
   AddBox(surfaces, {{-1.3, 0.0, 1.95}, {0.05, 1.7, 0.05}, 0.3, metal, metal});
   const Material shade = painter.Paint(Pattern::kFabric, 0.75f);
   AddBox(surfaces, {{-1.3, -1.55, 1.95}, {0.34, 0.34, 0.34}, 0.3, shade, shade});
+}
+
+}  // namespace
+
+World MakeRoom(std::uint64_t seed) {
+  Painter painter = PainterOf(seed);
+  std::vector<Surface> surfaces;
+  AddShell(surfaces, painter);
+  AddPosters(surfaces, painter);
+  AddFurniture(surfaces, painter);
+  AddTablesAndSeats(surfaces, painter);
+  AddCrates(surfaces, painter);
 
   Light light;
   light.lamp = true;
@@ -210,7 +218,7 @@ World MakeRoom(std::uint64_t seed) {
 }
 
 std::vector<MovingBox> RoomDistractors(int count, std::uint64_t seed) {
-  Painter painter(HashBits(seed, 23, 9));
+  Painter painter = PainterOf(HashBits(seed, 23, 9));
   std::vector<MovingBox> boxes;
   for (int k = 0; k < count; ++k) {
     const double angle = 2.0 * std::numbers::pi * (k * 0.618 + painter.Draw(0.0, 0.1));

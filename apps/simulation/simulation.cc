@@ -171,7 +171,7 @@ cv::Mat Simulation::Render(int k) const {
   }
   const int frame = options_.first + k;
   return RenderFrame(
-      *world_, moving_, *rays_, path_.at, FrameTime(frame, path_.fps), frame, options_.render);
+      {*world_, moving_}, *rays_, path_.at, {FrameTime(frame, path_.fps), frame}, options_.render);
 }
 
 SimulatedSequence RenderSequence(const SimulationOptions& options, int num_threads) {

@@ -127,46 +127,20 @@ bool Overlap(const Footprint& a, const Footprint& b) {
   return true;
 }
 
-class StreetBuilder {
+// The ground around the path.
+class Ground {
  public:
-  StreetBuilder(const Trajectory& path, const StreetOptions& options)
-      : options_(options),
-        stations_(Stations(path, options.camera_height_m)),
-        station_index_(20.0),
-        footprint_index_(20.0) {
+  Ground(const Trajectory& path, double camera_height_m)
+      : stations_(Stations(path, camera_height_m)), station_index_(20.0) {
     for (std::size_t k = 0; k < stations_.size(); ++k) {
       station_index_.Add(stations_[k].place, static_cast<int>(k));
     }
   }
 
-  World Build() {
-    AddGround();
-    AddMarkings();
-    for (const int side : {-1, 1}) AddHouses(side);
-    for (const int side : {-1, 1}) AddParkedCars(side);
-    for (const int side : {-1, 1}) AddPolesAndTrees(side);
-    Light light;
-    light.ambient = 0.68f;
-    light.diffuse = 0.42f;
-    return World(std::move(surfaces_), light, Paint(Pattern::kSky, 0.82f));
-  }
-
- private:
-  double Draw(double low, double high) {
-    return low + (high - low) * UnitFrom(HashBits(options_.seed, ++draws_, 101), 0, 24);
-  }
-  Material Paint(Pattern pattern, float tone, float contrast = 1.0f) {
-    Material material;
-    material.pattern = pattern;
-    material.seed = HashBits(options_.seed, ++draws_, 102);
-    material.tone = tone;
-    material.contrast = contrast;
-    return material;
-  }
-  float Tone(double low, double high) { return static_cast<float>(Draw(low, high)); }
+  const std::vector<Station>& stations() const { return stations_; }
 
   // Height of the ground: the stations' heights, weighted by nearness.
-  double GroundHeight(const Vector2d& place) const {
+  double HeightAt(const Vector2d& place) const {
     double sum = 0.0;
     double weights = 0.0;
     station_index_.Near(place, kGroundReach + 8.0, [&](int k) {
@@ -179,7 +153,7 @@ class StreetBuilder {
     return weights > 0.0 ? sum / weights : stations_.front().height;
   }
 
-  void AddGround() {
+  void AddTo(std::vector<Surface>& surfaces, const Material& asphalt) const {
     std::map<std::pair<int, int>, double> heights;  // of the corners of the cells that exist
     std::map<std::pair<int, int>, bool> cells;
     const int reach = static_cast<int>(kGroundReach / kGroundCell);
@@ -195,11 +169,9 @@ class StreetBuilder {
     const auto corner = [&](int i, int j) {
       const Vector2d place(i * kGroundCell, j * kGroundCell);
       auto found = heights.find({i, j});
-      if (found == heights.end())
-        found = heights.emplace(std::pair(i, j), GroundHeight(place)).first;
+      if (found == heights.end()) found = heights.emplace(std::pair(i, j), HeightAt(place)).first;
       return Vector3d(place.x(), found->second, place.y());
     };
-    const Material asphalt = Paint(Pattern::kAsphalt, 0.42f);
     for (const auto& [cell, exists] : cells) {
       const auto [i, j] = cell;
       for (const bool upper : {false, true}) {
@@ -214,20 +186,20 @@ class StreetBuilder {
         surface.st_v = {surface.edge_v.x(), surface.edge_v.z()};
         surface.material = asphalt;
         surface.sheet = 0;
-        surfaces_.push_back(surface);
+        surfaces.push_back(surface);
       }
     }
   }
 
   // Height of the ground as it is drawn: on the triangles, not on the smooth function.
-  double DrawnGroundHeight(const Vector2d& place) const {
+  double DrawnHeightAt(const Vector2d& place) const {
     const Vector2d scaled = place / kGroundCell;
     const double i = std::floor(scaled.x());
     const double j = std::floor(scaled.y());
     const double x = scaled.x() - i;
     const double y = scaled.y() - j;
     const auto height = [&](double a, double b) {
-      return GroundHeight(kGroundCell * Vector2d(i + a, j + b));
+      return HeightAt(kGroundCell * Vector2d(i + a, j + b));
     };
     if (x + y <= 1.0) {
       const double h = height(0, 0);
@@ -235,60 +207,6 @@ class StreetBuilder {
     }
     const double h = height(1, 1);
     return h + (1.0 - x) * (height(0, 1) - h) + (1.0 - y) * (height(1, 0) - h);
-  }
-
-  static Vector2d Aside(const Station& station, double lateral, double along = 0.0) {
-    const Vector2d right(std::cos(station.yaw), -std::sin(station.yaw));
-    const Vector2d forward(std::sin(station.yaw), std::cos(station.yaw));
-    return station.place + lateral * right + along * forward;
-  }
-
-  // A thin slab on the road whose top lies `raise` above the highest ground under it.
-  void AddSlab(const Station& station,
-               double lateral,
-               double width,
-               double length,
-               double raise,
-               const Material& material) {
-    const Vector2d place = Aside(station, lateral);
-    double top = 1e9;
-    for (const double a : {-0.5, 0.5}) {
-      for (const double b : {-0.5, 0.5}) {
-        top = std::min(top, DrawnGroundHeight(Aside(station, lateral + a * width, b * length)));
-      }
-    }
-    const double thickness = raise + 0.5;
-    AddBox(surfaces_,
-           {Vector3d(place.x(), top - raise + thickness, place.y()),
-            {width, thickness, length},
-            station.yaw,
-            material,
-            material});
-  }
-
-  // Dashes along the road, drain covers, and slabs of pavement on both sides.
-  void AddMarkings() {
-    const int count = static_cast<int>(stations_.size());
-    for (int k = 0; k < count; k += 6) {
-      const Station& station = stations_[k];
-      if (k % 12 == 0 && Clear({Aside(station, -2.1), {0.1, 1.0}, station.yaw}, 1.2)) {
-        AddSlab(station, -2.1, 0.14, 2.0, 0.012, Paint(Pattern::kPlaster, 0.85f));
-      }
-      if (Draw(0.0, 1.0) < 0.35) {
-        const double lateral = Draw(-1.4, 1.4);
-        AddSlab(station, lateral, 0.6, 0.6, 0.01, Paint(Pattern::kTiles, 0.25f, 1.4f));
-      }
-    }
-    constexpr int kPavement = 4;
-    for (const int side : {-1, 1}) {
-      for (int k = 0; k < count; k += kPavement) {
-        const Station& station = stations_[k];
-        const double lateral = side * (options_.road_half_width_m + 1.4);
-        const Footprint footprint{Aside(station, lateral), {1.0, 0.5 * kPavement}, station.yaw};
-        if (!Clear(footprint, options_.road_half_width_m - 0.3)) continue;
-        AddSlab(station, lateral, 2.0, kPavement, 0.14, Paint(Pattern::kTiles, 0.6f));
-      }
-    }
   }
 
   // No station of the path lies within `margin` of the footprint.
@@ -300,9 +218,92 @@ class StreetBuilder {
     return clear;
   }
 
+ private:
+  std::vector<Station> stations_;
+  PlaneIndex station_index_;
+};
+
+Vector2d Aside(const Station& station, double lateral, double along = 0.0) {
+  const Vector2d right(std::cos(station.yaw), -std::sin(station.yaw));
+  const Vector2d forward(std::sin(station.yaw), std::cos(station.yaw));
+  return station.place + lateral * right + along * forward;
+}
+
+class StreetBuilder {
+ public:
+  StreetBuilder(const Trajectory& path, const StreetOptions& options)
+      : options_(options),
+        ground_(path, options.camera_height_m),
+        footprint_index_(20.0),
+        painter_(options.seed, {102, 101}) {}
+
+  World Build() {
+    ground_.AddTo(surfaces_, painter_.Paint(Pattern::kAsphalt, 0.42f));
+    AddMarkings();
+    for (const int side : {-1, 1}) AddHouses(side);
+    for (const int side : {-1, 1}) AddParkedCars(side);
+    for (const int side : {-1, 1}) AddPolesAndTrees(side);
+    Light light;
+    light.ambient = 0.68f;
+    light.diffuse = 0.42f;
+    return World(std::move(surfaces_), light, painter_.Paint(Pattern::kSky, 0.82f));
+  }
+
+ private:
+  float Tone(double low, double high) { return static_cast<float>(painter_.Draw(low, high)); }
+
+  // A thin slab on the road whose top lies `raise` above the highest ground under it.
+  // @param size  width across the road, length along it.
+  void AddSlab(const Station& station,
+               double lateral,
+               const Vector2d& size,
+               double raise,
+               const Material& material) {
+    const Vector2d place = Aside(station, lateral);
+    double top = 1e9;
+    for (const double a : {-0.5, 0.5}) {
+      for (const double b : {-0.5, 0.5}) {
+        top = std::min(top,
+                       ground_.DrawnHeightAt(Aside(station, lateral + a * size.x(), b * size.y())));
+      }
+    }
+    const double thickness = raise + 0.5;
+    AddBox(surfaces_,
+           {Vector3d(place.x(), top - raise + thickness, place.y()),
+            {size.x(), thickness, size.y()},
+            station.yaw,
+            material,
+            material});
+  }
+
+  // Dashes along the road, drain covers, and slabs of pavement on both sides.
+  void AddMarkings() {
+    const int count = static_cast<int>(ground_.stations().size());
+    for (int k = 0; k < count; k += 6) {
+      const Station& station = ground_.stations()[k];
+      if (k % 12 == 0 && ground_.Clear({Aside(station, -2.1), {0.1, 1.0}, station.yaw}, 1.2)) {
+        AddSlab(station, -2.1, {0.14, 2.0}, 0.012, painter_.Paint(Pattern::kPlaster, 0.85f));
+      }
+      if (painter_.Draw(0.0, 1.0) < 0.35) {
+        const double lateral = painter_.Draw(-1.4, 1.4);
+        AddSlab(station, lateral, {0.6, 0.6}, 0.01, painter_.Paint(Pattern::kTiles, 0.25f, 1.4f));
+      }
+    }
+    constexpr int kPavement = 4;
+    for (const int side : {-1, 1}) {
+      for (int k = 0; k < count; k += kPavement) {
+        const Station& station = ground_.stations()[k];
+        const double lateral = side * (options_.road_half_width_m + 1.4);
+        const Footprint footprint{Aside(station, lateral), {1.0, 0.5 * kPavement}, station.yaw};
+        if (!ground_.Clear(footprint, options_.road_half_width_m - 0.3)) continue;
+        AddSlab(station, lateral, {2.0, kPavement}, 0.14, painter_.Paint(Pattern::kTiles, 0.6f));
+      }
+    }
+  }
+
   // Takes the ground for a solid thing where it blocks neither road nor neighbour.
   bool Claim(const Footprint& footprint, double margin) {
-    if (!Clear(footprint, margin)) return false;
+    if (!ground_.Clear(footprint, margin)) return false;
     bool free = true;
     footprint_index_.Near(footprint.center, footprint.half.norm() + 12.0, [&](int k) {
       free = free && !Overlap(footprint, footprints_[k]);
@@ -315,16 +316,17 @@ class StreetBuilder {
 
   const Station& StationAt(double way) const {
     const auto index = static_cast<std::size_t>(std::max(0.0, way / kStation));
-    return stations_[std::min(index, stations_.size() - 1)];
+    return ground_.stations()[std::min(index, ground_.stations().size() - 1)];
   }
 
   void AddHouses(int side) {
-    const double end = stations_.back().way_m;
-    for (double way = Draw(0.0, 4.0); way < end;) {
-      const double front = Draw(7.0, 14.0);
-      const double depth = Draw(7.0, 11.0);
-      const double setback = options_.house_setback_m + Draw(0.0, 2.5);
-      const double gap = Draw(0.0, 1.0) < 0.4 ? 0.05 : Draw(0.5, 3.0 * options_.mean_gap_m);
+    const double end = ground_.stations().back().way_m;
+    for (double way = painter_.Draw(0.0, 4.0); way < end;) {
+      const double front = painter_.Draw(7.0, 14.0);
+      const double depth = painter_.Draw(7.0, 11.0);
+      const double setback = options_.house_setback_m + painter_.Draw(0.0, 2.5);
+      const double gap =
+          painter_.Draw(0.0, 1.0) < 0.4 ? 0.05 : painter_.Draw(0.5, 3.0 * options_.mean_gap_m);
       const Station& station = StationAt(way + 0.5 * front);
       const Vector2d place = Aside(station, side * (setback + 0.5 * depth));
       const Footprint footprint{place, {0.5 * depth, 0.5 * front}, station.yaw};
@@ -338,22 +340,22 @@ class StreetBuilder {
   }
 
   void AddHouse(const Footprint& footprint, const Station& station) {
-    const double ground = std::min(station.height, GroundHeight(footprint.center));
-    const double buried = 0.25 + std::abs(station.height - GroundHeight(footprint.center));
-    const double height = Draw(5.5, 13.0);
+    const double ground = std::min(station.height, ground_.HeightAt(footprint.center));
+    const double buried = 0.25 + std::abs(station.height - ground_.HeightAt(footprint.center));
+    const double height = painter_.Draw(5.5, 13.0);
     const Vector3d foot(footprint.center.x(), ground + buried, footprint.center.y());
     const Vector3d size(2.0 * footprint.half.x(), height + buried, 2.0 * footprint.half.y());
-    const Material front = Paint(Pattern::kFacade, Tone(0.42, 0.68));
-    const Material roof = Paint(Pattern::kTiles, Tone(0.25, 0.4));
+    const Material front = painter_.Paint(Pattern::kFacade, Tone(0.42, 0.68));
+    const Material roof = painter_.Paint(Pattern::kTiles, Tone(0.25, 0.4));
     AddBox(surfaces_, {foot, size, footprint.yaw, front, roof});
     // The eaves stand out a little, and a smaller storey or chimney sits on top.
     const Vector3d top = foot - Vector3d(0.0, size.y(), 0.0);
     AddBox(surfaces_, {top, {size.x() + 0.5, 0.3, size.z() + 0.04}, footprint.yaw, roof, roof});
-    if (Draw(0.0, 1.0) < 0.6) {
-      const Material upper = Paint(Pattern::kFacade, Tone(0.35, 0.6));
+    if (painter_.Draw(0.0, 1.0) < 0.6) {
+      const Material upper = painter_.Paint(Pattern::kFacade, Tone(0.35, 0.6));
       AddBox(surfaces_,
              {top - Vector3d(0.0, 0.3, 0.0),
-              {0.7 * size.x(), Draw(1.2, 2.6), Draw(0.4, 0.8) * size.z()},
+              {0.7 * size.x(), painter_.Draw(1.2, 2.6), painter_.Draw(0.4, 0.8) * size.z()},
               footprint.yaw,
               upper,
               roof});
@@ -361,31 +363,32 @@ class StreetBuilder {
   }
 
   void AddParkedCars(int side) {
-    const double end = stations_.back().way_m;
+    const double end = ground_.stations().back().way_m;
     for (double way = 3.0; way < end; way += 6.0) {
-      if (Draw(0.0, 1.0) > options_.car_density) continue;
+      if (painter_.Draw(0.0, 1.0) > options_.car_density) continue;
       const Station& station = StationAt(way);
-      const double lateral = side * (options_.road_half_width_m - 0.75 + Draw(-0.1, 0.2));
-      const Vector2d place = Aside(station, lateral, Draw(-0.5, 0.5));
-      const double length = Draw(3.7, 4.7);
-      const Footprint footprint{place, {0.87, 0.5 * length}, station.yaw + Draw(-0.03, 0.03)};
+      const double lateral = side * (options_.road_half_width_m - 0.75 + painter_.Draw(-0.1, 0.2));
+      const Vector2d place = Aside(station, lateral, painter_.Draw(-0.5, 0.5));
+      const double length = painter_.Draw(3.7, 4.7);
+      const Footprint footprint{
+          place, {0.87, 0.5 * length}, station.yaw + painter_.Draw(-0.03, 0.03)};
       if (!Claim(footprint, options_.road_half_width_m - 1.9)) continue;
-      AddCar({place.x(), DrawnGroundHeight(place), place.y()}, length, footprint.yaw);
+      AddCar({place.x(), ground_.DrawnHeightAt(place), place.y()}, length, footprint.yaw);
     }
   }
 
   void AddCar(const Vector3d& foot, double length, double yaw) {
-    const Material body = Paint(Pattern::kPanel, Tone(0.25, 0.75), 0.8f);
-    const Material glass = Paint(Pattern::kPanel, Tone(0.2, 0.3), 0.9f);
-    const Material rubber = Paint(Pattern::kPlaster, 0.1f);
-    const double belt = Draw(0.7, 0.85);
+    const Material body = painter_.Paint(Pattern::kPanel, Tone(0.25, 0.75), 0.8f);
+    const Material glass = painter_.Paint(Pattern::kPanel, Tone(0.2, 0.3), 0.9f);
+    const Material rubber = painter_.Paint(Pattern::kPlaster, 0.1f);
+    const double belt = painter_.Draw(0.7, 0.85);
     AddBox(surfaces_, {foot - Vector3d(0, 0.22, 0), {1.74, belt - 0.22, length}, yaw, body, body});
-    const double cabin = Draw(0.5, 0.7) * length;
+    const double cabin = painter_.Draw(0.5, 0.7) * length;
     const Vector3d forward(std::sin(yaw), 0.0, std::cos(yaw));
     const Vector3d right(std::cos(yaw), 0.0, -std::sin(yaw));
     AddBox(surfaces_,
            {foot - Vector3d(0, belt, 0) - 0.08 * length * forward,
-            {1.5, Draw(0.5, 0.75), cabin},
+            {1.5, painter_.Draw(0.5, 0.75), cabin},
             yaw,
             glass,
             body});
@@ -400,51 +403,51 @@ class StreetBuilder {
   }
 
   void AddPolesAndTrees(int side) {
-    const double end = stations_.back().way_m;
-    for (double way = 5.0 + 3.0 * side; way < end; way += Draw(7.0, 14.0)) {
+    const double end = ground_.stations().back().way_m;
+    for (double way = 5.0 + 3.0 * side; way < end; way += painter_.Draw(7.0, 14.0)) {
       const Station& station = StationAt(way);
       const double lateral = side * (options_.road_half_width_m + 0.75);
       const Vector2d place = Aside(station, lateral);
-      const bool tree = Draw(0.0, 1.0) < 0.4;
+      const bool tree = painter_.Draw(0.0, 1.0) < 0.4;
       const Footprint footprint{place, Vector2d::Constant(tree ? 0.15 : 0.08), station.yaw};
       if (!Claim(footprint, options_.road_half_width_m)) continue;
-      const Vector3d foot(place.x(), DrawnGroundHeight(place) + 0.05, place.y());
+      const Vector3d foot(place.x(), ground_.DrawnHeightAt(place) + 0.05, place.y());
       if (tree) {
-        const Material bark = Paint(Pattern::kLeaves, 0.3f);
-        const Material leaves = Paint(Pattern::kLeaves, 0.4f);
-        const double trunk = Draw(2.2, 3.0);
-        AddBox(surfaces_, {foot, {0.28, trunk, 0.28}, Draw(0.0, 1.5), bark, bark});
-        const double crown = Draw(1.4, 2.2);
+        const Material bark = painter_.Paint(Pattern::kLeaves, 0.3f);
+        const Material leaves = painter_.Paint(Pattern::kLeaves, 0.4f);
+        const double trunk = painter_.Draw(2.2, 3.0);
+        AddBox(surfaces_, {foot, {0.28, trunk, 0.28}, painter_.Draw(0.0, 1.5), bark, bark});
+        const double crown = painter_.Draw(1.4, 2.2);
         const Vector3d middle = foot - Vector3d(0.0, trunk, 0.0);
-        AddBox(surfaces_, {middle, {crown, 1.1 * crown, crown}, Draw(0.0, 1.5), leaves, leaves});
+        AddBox(surfaces_,
+               {middle, {crown, 1.1 * crown, crown}, painter_.Draw(0.0, 1.5), leaves, leaves});
         AddBox(surfaces_,
                {middle - Vector3d(0.2, 0.7 * crown, -0.2),
                 {0.7 * crown, crown, 0.7 * crown},
-                Draw(0.0, 1.5),
+                painter_.Draw(0.0, 1.5),
                 leaves,
                 leaves});
         continue;
       }
-      const Material metal = Paint(Pattern::kPlaster, Tone(0.2, 0.7));
-      const double height = Draw(2.4, 6.0);
+      const Material metal = painter_.Paint(Pattern::kPlaster, Tone(0.2, 0.7));
+      const double height = painter_.Draw(2.4, 6.0);
       AddBox(surfaces_, {foot, {0.12, height, 0.12}, station.yaw, metal, metal});
-      const Material sign = Paint(Pattern::kPoster, 0.5f);
+      const Material sign = painter_.Paint(Pattern::kPoster, 0.5f);
       AddBox(surfaces_,
              {foot - Vector3d(0.0, std::min(height, 3.0) - 0.7, 0.0),
-              {Draw(0.5, 0.8), Draw(0.5, 0.8), 0.16},
-              station.yaw + Draw(-0.2, 0.2),
+              {painter_.Draw(0.5, 0.8), painter_.Draw(0.5, 0.8), 0.16},
+              station.yaw + painter_.Draw(-0.2, 0.2),
               sign,
               sign});
     }
   }
 
   const StreetOptions options_;
-  const std::vector<Station> stations_;
-  PlaneIndex station_index_;
+  const Ground ground_;
   std::vector<Footprint> footprints_;
   PlaneIndex footprint_index_;
   std::vector<Surface> surfaces_;
-  std::int64_t draws_ = 0;
+  Painter painter_;
 };
 
 }  // namespace

@@ -68,29 +68,39 @@ float Noise(std::uint64_t seed, double x, double y) {
   return (v00 * (1.0f - a) + v10 * a) * (1.0f - b) + (v01 * (1.0f - a) + v11 * a) * b;
 }
 
+// The pixel of a surface that is painted: its middle and its width, m.
+struct Pixel {
+  double s = 0.0;
+  double t = 0.0;
+  float width = 0.0f;
+};
+
+// Sizes of a pattern: the largest, m, their number, and the strength of each to the one before.
+struct Scales {
+  float coarse = 0.0f;
+  int count = 0;
+  float gain = 0.0f;
+};
+
 // Octaves of value noise from wavelength `coarse` down, each half as long and `gain` as strong.
-float Octaves(std::uint64_t seed,
-              double s,
-              double t,
-              float width,
-              float coarse,
-              int num_octaves,
-              float gain) {
+float Octaves(std::uint64_t seed, const Pixel& at, const Scales& scales) {
+  float coarse = scales.coarse;
   float sum = 0.0f;
   float amplitude = 1.0f;
-  for (int k = 0; k < num_octaves; ++k) {
-    const float visible = Resolved(0.5f * coarse, width);
+  for (int k = 0; k < scales.count; ++k) {
+    const float visible = Resolved(0.5f * coarse, at.width);
     if (visible <= 0.0f) break;
-    sum +=
-        visible * amplitude * Noise(seed + static_cast<std::uint64_t>(k), s / coarse, t / coarse);
+    sum += visible * amplitude *
+           Noise(seed + static_cast<std::uint64_t>(k), at.s / coarse, at.t / coarse);
     coarse *= 0.5f;
-    amplitude *= gain;
+    amplitude *= scales.gain;
   }
   return sum;
 }
 
 // Random grey cells, in [-1, 1], mean zero.
-float Mosaic(std::uint64_t seed, double s, double t, float width, float cell_s, float cell_t) {
+float Mosaic(std::uint64_t seed, const Pixel& at, float cell_s, float cell_t) {
+  const auto& [s, t, width] = at;
   const float visible = Resolved(std::min(cell_s, cell_t), width);
   if (visible <= 0.0f) return 0.0f;
   const auto value = [seed](std::int64_t i, std::int64_t j) {
@@ -100,7 +110,8 @@ float Mosaic(std::uint64_t seed, double s, double t, float width, float cell_s, 
 }
 
 // One figure (bar, disc, ring, wedge) in some of the cells of side `cell`; in [-1, 1].
-float Marks(std::uint64_t seed, double s, double t, float width, float cell, float density) {
+float Marks(std::uint64_t seed, const Pixel& at, float cell, float density) {
+  const auto& [s, t, width] = at;
   const float visible = Resolved(0.25f * cell, width);
   if (visible <= 0.0f) return 0.0f;
   const double inverse = 1.0 / cell;
@@ -138,27 +149,19 @@ float Marks(std::uint64_t seed, double s, double t, float width, float cell, flo
 }
 
 // Marks at many scales: from `coarse` down, each 2.7 times finer, `gain` as strong.
-float Detail(std::uint64_t seed,
-             double s,
-             double t,
-             float width,
-             float coarse,
-             int num_scales,
-             float density,
-             float gain) {
+float Detail(std::uint64_t seed, const Pixel& at, const Scales& scales, float density) {
+  float coarse = scales.coarse;
   float sum = 0.0f;
   float amplitude = 1.0f;
-  for (int k = 0; k < num_scales; ++k) {
-    if (coarse < width) break;
+  for (int k = 0; k < scales.count; ++k) {
+    if (coarse < at.width) break;
     const float shift = 0.37f * static_cast<float>(k);  // so that cells of two scales do not align
     sum += amplitude * Marks(seed + static_cast<std::uint64_t>(k),
-                             s + shift * coarse,
-                             t + shift * coarse,
-                             width,
+                             {at.s + shift * coarse, at.t + shift * coarse, at.width},
                              coarse,
                              density);
     coarse /= 2.7f;
-    amplitude *= gain;
+    amplitude *= scales.gain;
   }
   return sum;
 }
@@ -208,8 +211,8 @@ float InsideJoints(const Cell& cell, float size_s, float size_t, float joint, fl
 }
 
 float Plaster(const Material& m, double s, double t, float width) {
-  const float stains = Octaves(m.seed, s, t, width, 1.3f, 5, 0.6f);
-  const float marks = Detail(m.seed + 20, s, t, width, 0.46f, 5, 0.55f, 0.92f);
+  const float stains = Octaves(m.seed, {s, t, width}, {1.3f, 5, 0.6f});
+  const float marks = Detail(m.seed + 20, {s, t, width}, {0.46f, 5, 0.92f}, 0.55f);
   return 0.10f * stains + 0.22f * marks;
 }
 
@@ -225,8 +228,8 @@ float Bricks(const Material& m, double s, double t, float width) {
   const float brick = 0.30f * Signed(hash, 0) + (UnitFrom(hash, 16) < 0.12f ? -0.3f : 0.0f);
   const float joints = 0.22f * (0.85f - inside);
   return visible * (inside * brick + joints) +
-         0.12f * Octaves(m.seed + 3, s, t, width, 2.7f, 4, 0.6f) +
-         0.14f * Detail(m.seed + 20, s, t, width, 1.9f, 6, 0.40f, 0.95f);
+         0.12f * Octaves(m.seed + 3, {s, t, width}, {2.7f, 4, 0.6f}) +
+         0.14f * Detail(m.seed + 20, {s, t, width}, {1.9f, 6, 0.95f}, 0.40f);
 }
 
 float Tiles(const Material& m, double s, double t, float width) {
@@ -238,8 +241,8 @@ float Tiles(const Material& m, double s, double t, float width) {
   const float visible = Resolved(0.5f * size, width);
   const float tile = checker + 0.16f * Signed(hash, 0);
   return visible * (inside * tile - 0.30f * (1.0f - inside)) +
-         0.24f * Detail(m.seed + 20, s, t, width, 0.5f * size, 4, 0.55f, 0.9f) +
-         0.07f * Octaves(m.seed + 3, s, t, width, 0.9f, 4, 0.7f);
+         0.24f * Detail(m.seed + 20, {s, t, width}, {0.5f * size, 4, 0.9f}, 0.55f) +
+         0.07f * Octaves(m.seed + 3, {s, t, width}, {0.9f, 4, 0.7f});
 }
 
 float Planks(const Material& m, double s, double t, float width) {
@@ -251,9 +254,9 @@ float Planks(const Material& m, double s, double t, float width) {
   const std::uint64_t hash = HashBits(m.seed, cell.i, cell.j);
   const float inside = InsideJoints(cell, size_s, size_t, 0.003f, width);
   const float visible = Resolved(0.5f * size_t, width);
-  const float grain = Octaves(m.seed + (hash & 15u), 0.15 * s, t, width, 0.05f, 3, 0.8f);
+  const float grain = Octaves(m.seed + (hash & 15u), {0.15 * s, t, width}, {0.05f, 3, 0.8f});
   return visible * (inside * 0.26f * Signed(hash, 0) - 0.32f * (1.0f - inside)) + 0.08f * grain +
-         0.22f * Detail(m.seed + 20, s, t, width, 0.21f, 4, 0.50f, 0.9f);
+         0.22f * Detail(m.seed + 20, {s, t, width}, {0.21f, 4, 0.9f}, 0.50f);
 }
 
 float Facade(const Material& m, double s, double t, float width) {
@@ -269,7 +272,7 @@ float Facade(const Material& m, double s, double t, float width) {
   float wall = brick ? Bricks(m, s, t, width) : 0.9f * Plaster(m, 0.5 * s, 0.5 * t, 0.5f * width);
   const auto height = static_cast<float>(t);
   const float plinth = CoverInterval(height, -1.0f, 0.55f, width);
-  wall += plinth * (-0.18f + 0.2f * Mosaic(m.seed + 30, s, t, width, 0.5f, 0.275f));
+  wall += plinth * (-0.18f + 0.2f * Mosaic(m.seed + 30, {s, t, width}, 0.5f, 0.275f));
   if (UnitFrom(style, 24) < 0.45f) {
     const float low = storey - 0.55f;
     const float band = CoverInterval(height, low, storey - 0.05f, width);
@@ -295,18 +298,18 @@ float Facade(const Material& m, double s, double t, float width) {
   float content = 0.0f;
   if (door) {
     content = -0.3f + 0.5f * UnitFrom(hash, 16) +
-              0.3f * Mosaic(m.seed + (hash & 1023u), s, t, width, 0.25f, 0.45f);
+              0.3f * Mosaic(m.seed + (hash & 1023u), {s, t, width}, 0.25f, 0.45f);
   } else {
     const float bar = 0.035f;
     const float panes = std::max(CoverInterval(x, -bar, bar, width),
                                  CoverInterval(y - 0.25f * half_h, -bar, bar, width));
     const float glass =
-        -0.36f + 0.22f * Mosaic(m.seed + (hash & 1023u), s, t, width, 0.31f, 0.43f) +
-        0.14f * Signed(hash, 24) + 0.16f * Marks(m.seed + 32, s, t, width, 0.24f, 0.5f);
+        -0.36f + 0.22f * Mosaic(m.seed + (hash & 1023u), {s, t, width}, 0.31f, 0.43f) +
+        0.14f * Signed(hash, 24) + 0.16f * Marks(m.seed + 32, {s, t, width}, 0.24f, 0.5f);
     const float curtain =
         UnitFrom(hash, 32) < 0.4f ? CoverInterval(y, half_h * Signed(hash, 40), 9.0f, width) : 0.0f;
     content =
-        glass + curtain * (0.5f + 0.2f * Mosaic(m.seed + 33, s, t, width, 0.09f, 3.0f) - glass);
+        glass + curtain * (0.5f + 0.2f * Mosaic(m.seed + 33, {s, t, width}, 0.09f, 3.0f) - glass);
     content += panes * (frame_tone - content);
   }
   const float opening = frame_tone + inner * (content - frame_tone);
@@ -314,9 +317,9 @@ float Facade(const Material& m, double s, double t, float width) {
 }
 
 float Asphalt(const Material& m, double s, double t, float width) {
-  const float patches = Marks(m.seed + 1, s, t, width, 3.1f, 0.6f);
-  return 0.20f * patches + 0.17f * Octaves(m.seed + 3, s, t, width, 1.1f, 4, 0.8f) +
-         0.20f * Detail(m.seed + 20, s, t, width, 1.3f, 5, 0.45f, 0.95f);
+  const float patches = Marks(m.seed + 1, {s, t, width}, 3.1f, 0.6f);
+  return 0.20f * patches + 0.17f * Octaves(m.seed + 3, {s, t, width}, {1.1f, 4, 0.8f}) +
+         0.20f * Detail(m.seed + 20, {s, t, width}, {1.3f, 5, 0.95f}, 0.45f);
 }
 
 float Poster(const Material& m, double s, double t, float width) {
@@ -329,9 +332,9 @@ float Poster(const Material& m, double s, double t, float width) {
   const float frame = UnitFrom(style, 8) < 0.5f ? -0.42f : 0.42f;
   const float text_top = m.size_t_m * (0.15f + 0.35f * UnitFrom(style, 16));
   const float cell = m.size_s_m / (4.0f + 5.0f * UnitFrom(style, 24));
-  const float picture = 0.34f * Mosaic(m.seed + 1, s, t, width, cell, 0.8f * cell) +
-                        0.22f * Mosaic(m.seed + 2, s, t, width, 0.31f * cell, 0.27f * cell) +
-                        0.34f * Detail(m.seed + 20, s, t, width, 1.6f * cell, 5, 0.6f, 0.9f);
+  const float picture = 0.34f * Mosaic(m.seed + 1, {s, t, width}, cell, 0.8f * cell) +
+                        0.22f * Mosaic(m.seed + 2, {s, t, width}, 0.31f * cell, 0.27f * cell) +
+                        0.34f * Detail(m.seed + 20, {s, t, width}, {1.6f * cell, 5, 0.9f}, 0.6f);
   const float line = 0.03f + 0.05f * UnitFrom(style, 32);
   const float paper = UnitFrom(style, 40) < 0.75f ? 0.36f : -0.36f;
   const float text = paper - 1.9f * paper * Letters(m.seed + 5, s, text_top - t, width, line);
@@ -360,22 +363,22 @@ float Shelf(const Material& m, double s, double t, float width) {
       0.15f * (1.0f - visible);
   const float board = CoverInterval(y, -0.01f, 0.022f, width);
   return books + board * (0.3f - books) +
-         0.12f * Detail(m.seed + 20, s, t, width, 0.1f, 3, 0.5f, 0.9f);
+         0.12f * Detail(m.seed + 20, {s, t, width}, {0.1f, 3, 0.9f}, 0.5f);
 }
 
 float Fabric(const Material& m, double s, double t, float width) {
   const float cell = 0.10f + 0.08f * UnitFrom(HashBits(m.seed, 7, 8), 0);
   const double a = s + t;  // figures stand on their corners
   const double b = s - t;
-  return 0.20f * Mosaic(m.seed + 1, a, b, 1.4f * width, cell, cell) +
-         0.16f * Mosaic(m.seed + 2, a, b, 1.4f * width, 0.33f * cell, 0.33f * cell) +
-         0.12f * Mosaic(m.seed + 3, s, t, width, 0.012f, 0.012f) +
-         0.2f * Detail(m.seed + 20, s, t, width, 2.0f * cell, 4, 0.5f, 0.9f);
+  return 0.20f * Mosaic(m.seed + 1, {a, b, 1.4f * width}, cell, cell) +
+         0.16f * Mosaic(m.seed + 2, {a, b, 1.4f * width}, 0.33f * cell, 0.33f * cell) +
+         0.12f * Mosaic(m.seed + 3, {s, t, width}, 0.012f, 0.012f) +
+         0.2f * Detail(m.seed + 20, {s, t, width}, {2.0f * cell, 4, 0.9f}, 0.5f);
 }
 
 float Leaves(const Material& m, double s, double t, float width) {
-  return 0.22f * Octaves(m.seed, s, t, width, 0.9f, 5, 0.75f) +
-         0.40f * Detail(m.seed + 20, s, t, width, 0.55f, 4, 0.8f, 0.85f);
+  return 0.22f * Octaves(m.seed, {s, t, width}, {0.9f, 5, 0.75f}) +
+         0.40f * Detail(m.seed + 20, {s, t, width}, {0.55f, 4, 0.85f}, 0.8f);
 }
 
 float Panel(const Material& m, double s, double t, float width) {
@@ -393,11 +396,12 @@ float Panel(const Material& m, double s, double t, float width) {
   const float sign = UnitFrom(hash, 24) < 0.5f ? -1.0f : 1.0f;
   const float text = sign * (0.35f - 0.7f * Letters(m.seed + 5, s, -t, width, line));
   return 0.12f * Signed(hash, 32) - 0.4f * seam + label * text +
-         0.18f * Detail(m.seed + 20, s, t, width, 0.5f * std::min(size_s, size_t), 5, 0.45f, 0.9f);
+         0.18f *
+             Detail(m.seed + 20, {s, t, width}, {0.5f * std::min(size_s, size_t), 5, 0.9f}, 0.45f);
 }
 
 float Sky(const Material& m, double s, double t, float width) {
-  return 0.08f * Octaves(m.seed, s, 2.0 * t, width, 0.5f, 3, 0.5f);
+  return 0.08f * Octaves(m.seed, {s, 2.0 * t, width}, {0.5f, 3, 0.5f});
 }
 
 float Figure(const Material& m, double s, double t, float width) {

@@ -71,6 +71,35 @@ struct Light {
   float diffuse = 0.5f;
 };
 
+/// Hands out materials, each with a seed of its own, and numbers.
+class Painter {
+ public:
+  struct Streams {
+    int materials = 0;
+    int numbers = 0;
+  };
+
+  Painter(std::uint64_t seed, const Streams& streams) : seed_(seed), streams_(streams) {}
+
+  Material Paint(Pattern pattern, float tone, float contrast = 1.0f) {
+    Material material;
+    material.pattern = pattern;
+    material.seed = HashBits(seed_, ++count_, streams_.materials);
+    material.tone = tone;
+    material.contrast = contrast;
+    return material;
+  }
+  /// A number in [low, high).
+  double Draw(double low, double high) {
+    return low + (high - low) * UnitFrom(HashBits(seed_, ++count_, streams_.numbers), 0, 24);
+  }
+
+ private:
+  std::uint64_t seed_;
+  Streams streams_;
+  std::int64_t count_ = 0;
+};
+
 /// Surfaces with a bounding volume hierarchy for ray casting.
 class World {
  public:

@@ -135,21 +135,53 @@ std::string EurocTruth(const Simulation& simulation) {
   return text;
 }
 
+// Throws std::invalid_argument where EuRoC's files cannot hold the camera.
+void CheckForEuroc(const Camera& camera) {
+  if (camera.readout_s > 0.0) {
+    throw std::invalid_argument(
+        "EuRoC's sensor.yaml has no place for a rolling shutter; use the layout tum");
+  }
+  if (camera.model == CameraModel::kRational || camera.model == CameraModel::kFov) {
+    throw std::invalid_argument(std::string("EuRoC's sensor.yaml has no place for a ") +
+                                Name(camera.model) + " lens; use the layout tum");
+  }
+}
+
+// Makes the folder of the images. Throws std::runtime_error where it holds others.
+void MakeImageFolder(const fs::path& folder, const std::vector<std::string>& names) {
+  MakeFolder(folder);
+  const std::set<std::string> ours(names.begin(), names.end());
+  for (const auto& entry : fs::directory_iterator(folder)) {
+    if (entry.path().extension() == ".png" && !ours.contains(entry.path().filename().string())) {
+      throw std::runtime_error(folder.string() +
+                               " already holds another sequence; choose an empty --out");
+    }
+  }
+}
+
+void WriteImages(const Simulation& simulation,
+                 const fs::path& folder,
+                 const std::vector<std::string>& names,
+                 const WriteOptions& options) {
+  const int count = simulation.NumFrames();
+  // In batches, so that progress is told from one thread.
+  const int batch = std::max(1, 4 * options.num_threads);
+  for (int begin = 0; begin < count; begin += batch) {
+    const int size = std::min(batch, count - begin);
+    ParallelFor(size, options.num_threads, [&](int k) {
+      WriteImage(folder / names[begin + k], simulation.Render(begin + k));
+    });
+    if (options.progress) options.progress(begin + size, count);
+  }
+}
+
 }  // namespace
 
 std::vector<std::string> WriteSequence(const Simulation& simulation,
                                        const fs::path& out,
                                        const WriteOptions& options) {
   const bool euroc = options.layout == SequenceLayout::kEuroc;
-  if (euroc && simulation.GetCamera().readout_s > 0.0) {
-    throw std::invalid_argument(
-        "EuRoC's sensor.yaml has no place for a rolling shutter; use the layout tum");
-  }
-  const CameraModel model = simulation.GetCamera().model;
-  if (euroc && (model == CameraModel::kRational || model == CameraModel::kFov)) {
-    throw std::invalid_argument(std::string("EuRoC's sensor.yaml has no place for a ") +
-                                Name(model) + " lens; use the layout tum");
-  }
+  if (euroc) CheckForEuroc(simulation.GetCamera());
   const fs::path folder = euroc ? "mav0/cam0/data" : "rgb";
   const int count = simulation.NumFrames();
   std::vector<std::string> names;
@@ -157,24 +189,8 @@ std::vector<std::string> WriteSequence(const Simulation& simulation,
     names.push_back(euroc ? Format("%lld.png", Nanoseconds(pose.timestamp_s))
                           : Format("%.6f.png", pose.timestamp_s));
   }
-  MakeFolder(out / folder);
-  const std::set<std::string> ours(names.begin(), names.end());
-  for (const auto& entry : fs::directory_iterator(out / folder)) {
-    if (entry.path().extension() == ".png" && !ours.contains(entry.path().filename().string())) {
-      throw std::runtime_error((out / folder).string() +
-                               " already holds another sequence; choose an empty --out");
-    }
-  }
-
-  // In batches, so that progress is told from one thread.
-  const int batch = std::max(1, 4 * options.num_threads);
-  for (int begin = 0; begin < count; begin += batch) {
-    const int size = std::min(batch, count - begin);
-    ParallelFor(size, options.num_threads, [&](int k) {
-      WriteImage(out / folder / names[begin + k], simulation.Render(begin + k));
-    });
-    if (options.progress) options.progress(begin + size, count);
-  }
+  MakeImageFolder(out / folder, names);
+  WriteImages(simulation, out / folder, names, options);
 
   std::vector<std::string> written = {folder.string() + "/"};
   const auto write = [&](const std::string& name, const std::string& text) {

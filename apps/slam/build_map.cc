@@ -246,10 +246,11 @@ void KeyframeMapBuilder::SolveKnownRotation() {
 }
 
 void KeyframeMapBuilder::AdjustComponents() {
-  refined_ = RefineComponents(keyframe_rotations_,
-                              result_.krot,
-                              result_.keyframe_tracks,
-                              result_.segments,
+  refined_ = RefineComponents({keyframe_rotations_,
+                               result_.krot.center_in_world,
+                               result_.keyframe_tracks,
+                               result_.segments},
+                              result_.krot.component,
                               orientations_.camera,
                               bundle_options_,
                               complete_);
@@ -259,6 +260,9 @@ void KeyframeMapBuilder::AdjustComponents() {
 void KeyframeMapBuilder::CorrectMaps() {
   if (!options_.relocalisation.enabled) return;
   MapCorrectionSources sources;
+  sources.calibrated = orientations_.camera;
+  sources.tracks = result_.keyframe_tracks;
+  sources.seed = options_.seed;
   for (const LoopCheck& check : orientations_.loops) {
     sources.lookalikes.push_back({check.frame, check.match});
   }
@@ -268,13 +272,8 @@ void KeyframeMapBuilder::CorrectMaps() {
   sources.describe = DescriptionByImages(refined_.camera);
   sources.complete = complete_;
   sources.segments = result_.segments;
-  result_.relocalised = rotslam::CorrectMaps(std::move(sources),
-                                             orientations_.camera,
-                                             result_.keyframe_tracks,
-                                             options_.relocalisation,
-                                             options_.seed,
-                                             bundle_options_,
-                                             refined_);
+  result_.relocalised =
+      rotslam::CorrectMaps(std::move(sources), options_.relocalisation, bundle_options_, refined_);
   result_.keyframes.insert(result_.relocalised.begin(), result_.relocalised.end());
   result_.camera = refined_.camera;
 }

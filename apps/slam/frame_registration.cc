@@ -47,8 +47,12 @@ void RegisterFrames(const Orientations& orientations,
       std::any_of(result.bundles.begin(), result.bundles.end(), [](const BundleSummary& bundle) {
         return bundle.has_motion_blur;
       });
-  const std::map<FrameId, ResectedPose> poses = ResectFrames(
-      starts, result.map.point_in_world, all_tracks, result.camera, resection, options.num_threads);
+  const std::map<FrameId, ResectedPose> poses =
+      ResectFrames(starts,
+                   {result.map.point_in_world, all_tracks},
+                   result.camera,
+                   resection,
+                   options.num_threads);
   for (const auto& [frame, pose] : poses) {
     result.cam_from_world[frame] = pose.cam_from_world;
     result.center_in_world[frame] = pose.center_in_world;

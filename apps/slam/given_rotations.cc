@@ -106,7 +106,7 @@ GivenRotations MatchGivenRotations(const OrientationsFromElsewhere& elsewhere,
         std::to_string(first_missing) + " at " + FormatNumber("%.6f", timestamps_s[first_missing]) +
         " s; the file reaches from " + FormatNumber("%.6f", given.front().timestamp_s) + " to " +
         FormatNumber("%.6f", given.back().timestamp_s) + " s, gaps of up to " +
-        FormatNumber("%g", kMaxGapS) + " s are bridged");
+        FormatNumber("%g", kMaxGapS) + " s are interpolated");
   }
   for (std::size_t k = 0; k < timestamps_s.size(); ++k) {
     const auto at = std::lower_bound(given.begin(),

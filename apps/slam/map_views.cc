@@ -62,8 +62,7 @@ void SetMotions(const MotionSources& sources, const Reconstruction& map, MapView
     }
   }
   const std::map<FrameId, ResectedPose> poses = ResectFrames(starts,
-                                                             map.point_in_world,
-                                                             sources.tracks,
+                                                             {map.point_in_world, sources.tracks},
                                                              sources.camera,
                                                              sources.resection,
                                                              sources.num_threads);

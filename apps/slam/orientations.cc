@@ -152,42 +152,6 @@ void ClassifyFrames(const OrientationInputs& inputs,
   }
 }
 
-// FindOrientations with a camera whose readout is known, or with the readout that the interrupted
-// run had estimated.
-Orientations FindWithReadout(FrameSource& frames,
-                             const Camera& camera,
-                             const std::optional<ReadoutEstimate>& readout,
-                             const SlamOptions& options,
-                             const OrientationInputs& inputs,
-                             SlamObserver& observer) {
-  Orientations orientations;
-  orientations.readout = readout;
-  orientations.camera = readout ? WithReadout(camera, *readout) : camera;
-  LoopedOdometry odometry(orientations.camera,
-                          options.rotodom,
-                          options.loop,
-                          inputs.vocabulary,
-                          inputs.keep_features,
-                          options.seed,
-                          options.num_threads);
-  ReadoutDecision decision(orientations.camera, options);
-  FrameStream stream(frames, odometry, inputs.log);
-  observer.OnBegin(SlamStage::kOrientations, frames.NumFrames());
-  if (const auto found = TrackFrames(stream, odometry, decision, observer, orientations)) {
-    observer.OnReadoutFound(*found);
-    if (inputs.log != nullptr) inputs.log->StartOver(*found);
-    frames.Rewind();
-    return FindWithReadout(frames, camera, found, options, inputs, observer);
-  }
-  TakeResults(odometry, inputs.keep_features, orientations);
-  if (orientations.interrupted && !orientations.IsUsable()) return orientations;
-  RequireFramesAndEdges(orientations);
-  stream.Commit();
-  ClassifyFrames(inputs, options.rotodom.averaging, orientations);
-  observer.OnEnd(SlamStage::kOrientations, orientations);
-  return orientations;
-}
-
 }  // namespace
 
 Orientations FindOrientations(FrameSource& frames,
@@ -195,9 +159,38 @@ Orientations FindOrientations(FrameSource& frames,
                               const SlamOptions& options,
                               const OrientationInputs& inputs,
                               SlamObserver& observer) {
+  // From the calibration, from the interrupted run or, in a second pass, from the images.
   std::optional<ReadoutEstimate> readout;
   if (inputs.log != nullptr) readout = inputs.log->readout();
-  return FindWithReadout(frames, camera, readout, options, inputs, observer);
+  while (true) {
+    Orientations orientations;
+    orientations.readout = readout;
+    orientations.camera = readout ? WithReadout(camera, *readout) : camera;
+    LoopedOdometry odometry(orientations.camera,
+                            {options.rotodom,
+                             options.loop,
+                             inputs.vocabulary,
+                             inputs.keep_features,
+                             options.seed,
+                             options.num_threads});
+    ReadoutDecision decision(orientations.camera, options);
+    FrameStream stream(frames, odometry, inputs.log);
+    observer.OnBegin(SlamStage::kOrientations, frames.NumFrames());
+    readout = TrackFrames(stream, odometry, decision, observer, orientations);
+    if (readout) {
+      observer.OnReadoutFound(*readout);
+      if (inputs.log != nullptr) inputs.log->StartOver(*readout);
+      frames.Rewind();
+      continue;
+    }
+    TakeResults(odometry, inputs.keep_features, orientations);
+    if (orientations.interrupted && !orientations.IsUsable()) return orientations;
+    RequireFramesAndEdges(orientations);
+    stream.Commit();
+    ClassifyFrames(inputs, options.rotodom.averaging, orientations);
+    observer.OnEnd(SlamStage::kOrientations, orientations);
+    return orientations;
+  }
 }
 
 std::map<FrameId, double> OrientationSigmas(const Orientations& orientations) {

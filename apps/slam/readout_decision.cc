@@ -42,7 +42,7 @@ void ReadoutDecision::Finish(const OdometryResult& result) {
 
 void ReadoutDecision::Estimate(const OdometryResult& result) {
   const auto readout = EstimateReadout(
-      camera_, frames_, result.graph, result.cam_from_world, relative_rotation_, num_threads_);
+      camera_, {frames_, result.graph, result.cam_from_world}, relative_rotation_, num_threads_);
   if (!readout) return;
   if (readout->IsRolling()) found_ = readout;
   is_on_ = !found_ && !readout->IsGlobal();

@@ -25,12 +25,12 @@ std::optional<std::string> LensOptions::Problem() const {
 }
 
 std::optional<std::string> BundleOptions::Problem() const {
-  if (auto problem = ProblemIn("bridge", bridge)) return problem;
+  if (auto problem = ProblemIn("fixed_rotation", fixed_rotation)) return problem;
   if (auto problem = ProblemIn("coarse", coarse)) return problem;
   if (auto problem = ProblemIn("fine", fine)) return problem;
   if (auto problem = ProblemIn("lens", lens)) return problem;
-  if (!bridge.enabled && !coarse.enabled && !fine.enabled) {
-    return "fine.enabled is false, must be true for one of bridge, coarse and fine";
+  if (!fixed_rotation.enabled && !coarse.enabled && !fine.enabled) {
+    return "fine.enabled is false, must be true for one of fixed_rotation, coarse and fine";
   }
   if (preparing_observations < 0) {
     return OutOfRange("preparing_observations", preparing_observations, "at least 0");

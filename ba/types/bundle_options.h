@@ -93,17 +93,18 @@ struct BundleOptions {
   // From known-rotation positions, which are a few percent of the path length off, so that a tight
   // test against them would throw away 5 to 10 % of the good observations: none is made. Outliers
   // still in it keep the cost moving long after the cameras have arrived, hence the tolerance.
-  BundleRound bridge = {.refine_rotations = false, .max_error_px = 0.0, .function_tolerance = 1e-3};
-  // What is within 4 px of the bridge, rotations free.
+  BundleRound fixed_rotation = {
+      .refine_rotations = false, .max_error_px = 0.0, .function_tolerance = 1e-3};
+  // What is within 4 px after the fixed-rotation stage, rotations free.
   BundleRound coarse = {.max_error_px = 4.0};
   // What is within 2 px of that. Steps are Gauss-Newton's nearly from the start: damping holds back
   // what little there is left to correct, the long waves in which a way bends.
   BundleRound fine = {
       .max_error_px = 2.0, .max_iterations = 50, .initial_radius = 1e8, .function_tolerance = 1e-5};
-  // What comes before closing takes tracks at random until every frame has so many observations:
-  // enough to say where cameras are, at a third of the time; what closes takes all. 0: all from the
-  // start. The longest tracks would do worse: they are those that the lens' errors and the
-  // tracker's drift bend most.
+  // What comes before the final stage takes tracks at random until every frame has so many
+  // observations: enough to say where cameras are, at a third of the time; the final stage takes
+  // all. 0: all from the start. The longest tracks would do worse: they are those that the lens'
+  // errors and the tracker's drift bend most.
   int preparing_observations = 300;
   // Keypoints are often better than their sigma says, and what is far out for them are tracks that
   // drift. So from the fine round on the loss leaves the quadratic at this many spreads of the

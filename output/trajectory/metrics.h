@@ -11,7 +11,7 @@ namespace rotslam {
 /// How two trajectories are paired and compared.
 struct MetricsOptions {
   // Largest gap between two ground-truth poses to interpolate over, seconds. Motion-capture runs
-  // at 100 Hz or more, so 0.2 s bridges a short loss of sight and nothing longer.
+  // at 100 Hz or more, so 0.2 s spans a short loss of sight and nothing longer.
   double max_gap_s = 0.2;
   // A ground-truth pose this near in time counts as the estimate's own, whatever the gap, seconds.
   double exact_s = 1e-4;

@@ -184,7 +184,7 @@ bool Overlap(const Trajectory& a, const Trajectory& b) {
               FormatNumber("%.9g", apart_s) + " would move the estimate there";
   } else {
     reason +=
-        "do the timestamps agree? KITTI files take theirs from --times; --max-gap bridges "
+        "do the timestamps agree? KITTI files take theirs from --times; --max-gap interpolates "
         "gaps in the ground truth";
   }
   throw std::runtime_error(reason);
@@ -270,6 +270,165 @@ std::string AxesText(const Rotation& rotation) {
          FormatNumber("%.3f", axis.z()) + ")";
 }
 
+class TrajectoryMatcher {
+ public:
+  TrajectoryMatcher(const NamedTrajectory& truth,
+                    const NamedTrajectory& estimate,
+                    const MatchOptions& options)
+      : truth_(truth),
+        estimate_(estimate),
+        options_(options),
+        truth_w_last_(IsReadWithWLast(truth.file)),
+        estimate_w_last_(IsReadWithWLast(estimate.file)) {}
+
+  MatchedTrajectories Match() {
+    PairInTime();
+    step_ = StepWithRotation(matched_.pairs);
+    turn_deg_ = MedianTurnDeg(matched_.pairs, step_);
+    as_is_deg_ = ResidualDeg(matched_.pairs, step_);
+    if (as_is_deg_ < kMinDisagreementDeg && !options_.align_axes) return std::move(matched_);
+    const std::optional<Candidate> best = BestReading();
+    const std::optional<AxesFit> axes = FitAxes(matched_.pairs, step_);
+    if (best && axes) {
+      TakeReading(*best);
+    } else if (best) {
+      Note("relative rotations differ by " + AsIsText() + " and fit if " + TextOf(best->reading) +
+           ", but they have one axis alone, which cannot tell that from other axes of the camera: "
+           "nothing is changed");
+    } else if (axes) {
+      CompareAxes(*axes);
+    } else if (options_.align_axes) {
+      throw std::runtime_error(
+          truth_.name +
+          ": its rotations have one axis alone, from which --align-axes cannot "
+          "find the rotation between the axes; leave it out");
+    }
+    return std::move(matched_);
+  }
+
+ private:
+  void Note(const std::string& note) { matched_.notes.push_back(note); }
+  void Associate() {
+    matched_.pairs = AssociatePoses(matched_.ground_truth, matched_.estimate, options_.metrics);
+  }
+  std::string TextOf(const Reading& reading) const { return Describe(reading, truth_, estimate_); }
+  std::string AsIsText() const {
+    return FormatNumber("%.3g", as_is_deg_) + " deg as the files stand (median over " +
+           std::to_string(step_) + (step_ == 1 ? " pose)" : " poses)");
+  }
+  bool IsFarBetter(double residual_deg) const {
+    return kClearlyBetter * residual_deg < as_is_deg_ && kClearlyBetter * residual_deg < turn_deg_;
+  }
+  std::vector<PosePair> ReadAs(const Reading& reading) const {
+    return ReadPairs(matched_.pairs, reading, truth_w_last_, estimate_w_last_);
+  }
+
+  // Pairs the poses by their times or, where one file has none, in their order.
+  void PairInTime() {
+    matched_.ground_truth = truth_.file.poses;
+    matched_.estimate = estimate_.file.poses;
+    for (const NamedTrajectory* named : {&truth_, &estimate_}) {
+      for (const std::string& note : named->file.notes) Note(named->name + ": " + note);
+    }
+    for (StampedPose& pose : matched_.estimate) pose.timestamp_s += options_.time_offset_s;
+    Associate();
+    const bool truth_is_numbered = AreNumbers(truth_.file);
+    if (matched_.pairs.size() < 3 && truth_is_numbered != AreNumbers(estimate_.file)) {
+      const bool has_taken = truth_is_numbered || options_.is_estimate_known
+                                 ? TakeTimesInOrder(matched_.ground_truth, matched_.estimate)
+                                 : TakeTimesInOrder(matched_.estimate, matched_.ground_truth);
+      if (has_taken) {
+        Note((truth_is_numbered ? truth_ : estimate_).name + " has no times; both have " +
+             std::to_string(matched_.estimate.size()) + " poses, which are paired in their order");
+        Associate();
+      }
+    }
+    if (matched_.pairs.size() < 3) {
+      FailToPair(truth_, estimate_, matched_.estimate, matched_.pairs.size(), options_);
+    }
+  }
+
+  // The other reading that fits best; nullopt where none is far better than the files as they
+  // stand.
+  std::optional<Candidate> BestReading() const {
+    std::vector<Candidate> candidates;
+    for (const Reading& reading : OtherReadings(truth_.file, estimate_.file, options_)) {
+      Candidate candidate{reading, ReadAs(reading), 0.0};
+      candidate.residual_deg = ResidualDeg(candidate.pairs, step_);
+      if (IsFarBetter(candidate.residual_deg)) candidates.push_back(std::move(candidate));
+    }
+    if (candidates.empty()) return std::nullopt;
+    std::sort(candidates.begin(), candidates.end(), [](const Candidate& a, const Candidate& b) {
+      return a.residual_deg < b.residual_deg;
+    });
+    // Readings that fit alike are the inverse of one file or the other; the positions choose.
+    while (candidates.back().residual_deg > 2.0 * candidates.front().residual_deg + 0.05) {
+      candidates.pop_back();
+    }
+    return *std::min_element(
+        candidates.begin(), candidates.end(), [](const Candidate& a, const Candidate& b) {
+          return PositionsFitBetter(a.pairs, b.pairs);
+        });
+  }
+
+  void TakeReading(const Candidate& best) {
+    const Reading& reading = best.reading;
+    const std::string residual =
+        FormatNumber("%.3g", best.residual_deg) + " deg instead of " + AsIsText();
+    if (options_.as_is) {
+      Note("relative rotations fit far better if " + TextOf(reading) + ": " + residual);
+      return;
+    }
+    Note(TextOf(reading) + ": relative rotations then differ by " + residual +
+         "; --as-is leaves it");
+    for (StampedPose& pose : matched_.ground_truth) {
+      pose = Read(pose, reading.truth_order, truth_w_last_, reading.truth_inverse);
+    }
+    for (StampedPose& pose : matched_.estimate) {
+      pose = Read(pose, reading.estimate_order, estimate_w_last_, reading.estimate_inverse);
+    }
+    Associate();
+  }
+
+  // Takes a constant rotation between the axes out, or tells of it.
+  void CompareAxes(const AxesFit& axes) {
+    const Rotation& X = axes.truth_axes_from_estimate_axes;
+    const std::string turned =
+        "the estimate's axes are those of the truth turned by " + AxesText(X);
+    if (options_.align_axes) {
+      for (StampedPose& pose : matched_.ground_truth) pose.world_from_cam = pose.world_from_cam * X;
+      Associate();
+      Note(turned + ", which is taken out");
+      return;
+    }
+    if (IsFarBetter(axes.residual_deg)) {
+      Note(turned + ": relative rotations differ by " + AsIsText() + ", by " +
+           FormatNumber("%.3g", axes.residual_deg) + " deg without it; --align-axes takes it out");
+      return;
+    }
+    // The inverse of one of them with other axes, or qw in the other place.
+    for (const Reading& reading : OtherReadings(truth_.file, estimate_.file, options_)) {
+      const auto fit = FitAxes(ReadAs(reading), step_);
+      if (!fit || !IsFarBetter(fit->residual_deg)) continue;
+      Note("relative rotations differ by " + AsIsText() + ", by " +
+           FormatNumber("%.3g", fit->residual_deg) + " deg if " + TextOf(reading) +
+           " and its axes are turned by " + AxesText(fit->truth_axes_from_estimate_axes) +
+           ": expected are camera->world poses with qx qy qz qw");
+      return;
+    }
+  }
+
+  const NamedTrajectory& truth_;
+  const NamedTrajectory& estimate_;
+  const MatchOptions& options_;
+  const bool truth_w_last_;
+  const bool estimate_w_last_;
+  MatchedTrajectories matched_;
+  std::size_t step_ = 1;    // poses between which relative rotations are taken
+  double turn_deg_ = 0.0;   // median of these rotations
+  double as_is_deg_ = 0.0;  // median of their differences, as the files stand
+};
+
 }  // namespace
 
 std::optional<AxesFit> FitAxes(const std::vector<PosePair>& pairs, std::size_t step) {
@@ -310,129 +469,7 @@ std::optional<AxesFit> FitAxes(const std::vector<PosePair>& pairs, std::size_t s
 MatchedTrajectories MatchTrajectories(const NamedTrajectory& truth,
                                       const NamedTrajectory& estimate,
                                       const MatchOptions& options) {
-  MatchedTrajectories matched;
-  matched.ground_truth = truth.file.poses;
-  matched.estimate = estimate.file.poses;
-  for (const NamedTrajectory* named : {&truth, &estimate}) {
-    for (const std::string& note : named->file.notes) {
-      matched.notes.push_back(named->name + ": " + note);
-    }
-  }
-  for (StampedPose& pose : matched.estimate) pose.timestamp_s += options.time_offset_s;
-  matched.pairs = AssociatePoses(matched.ground_truth, matched.estimate, options.metrics);
-  if (matched.pairs.size() < 3 && AreNumbers(truth.file) != AreNumbers(estimate.file)) {
-    const bool truth_is_numbered = AreNumbers(truth.file);
-    const bool has_taken = truth_is_numbered || options.is_estimate_known
-                               ? TakeTimesInOrder(matched.ground_truth, matched.estimate)
-                               : TakeTimesInOrder(matched.estimate, matched.ground_truth);
-    if (has_taken) {
-      matched.notes.push_back(
-          (truth_is_numbered ? truth : estimate).name + " has no times; both have " +
-          std::to_string(matched.estimate.size()) + " poses, which are paired in their order");
-      matched.pairs = AssociatePoses(matched.ground_truth, matched.estimate, options.metrics);
-    }
-  }
-  if (matched.pairs.size() < 3) {
-    FailToPair(truth, estimate, matched.estimate, matched.pairs.size(), options);
-  }
-  const std::size_t step = StepWithRotation(matched.pairs);
-  const double turn_deg = MedianTurnDeg(matched.pairs, step);
-  const double as_is_deg = ResidualDeg(matched.pairs, step);
-  const auto is_far_better = [&](double residual_deg) {
-    return kClearlyBetter * residual_deg < as_is_deg && kClearlyBetter * residual_deg < turn_deg;
-  };
-  if (as_is_deg < kMinDisagreementDeg && !options.align_axes) return matched;
-
-  const bool truth_w_last = IsReadWithWLast(truth.file);
-  const bool estimate_w_last = IsReadWithWLast(estimate.file);
-  std::vector<Candidate> candidates;
-  for (const Reading& reading : OtherReadings(truth.file, estimate.file, options)) {
-    Candidate candidate{
-        reading, ReadPairs(matched.pairs, reading, truth_w_last, estimate_w_last), 0.0};
-    candidate.residual_deg = ResidualDeg(candidate.pairs, step);
-    if (is_far_better(candidate.residual_deg)) candidates.push_back(std::move(candidate));
-  }
-  const std::optional<AxesFit> axes = FitAxes(matched.pairs, step);
-  const bool axes_fit = axes && is_far_better(axes->residual_deg);
-  std::sort(candidates.begin(), candidates.end(), [](const Candidate& a, const Candidate& b) {
-    return a.residual_deg < b.residual_deg;
-  });
-  // Readings that fit alike are the inverse of one file or the other; the positions choose.
-  while (candidates.size() > 1 &&
-         candidates.back().residual_deg > 2.0 * candidates.front().residual_deg + 0.05) {
-    candidates.pop_back();
-  }
-  if (candidates.size() > 1) {
-    const auto best = std::min_element(
-        candidates.begin(), candidates.end(), [](const Candidate& a, const Candidate& b) {
-          return PositionsFitBetter(a.pairs, b.pairs);
-        });
-    std::iter_swap(candidates.begin(), best);
-  }
-  const std::string as_is_text = FormatNumber("%.3g", as_is_deg) +
-                                 " deg as the files stand (median over " + std::to_string(step) +
-                                 (step == 1 ? " pose)" : " poses)");
-  if (!candidates.empty() && axes) {
-    const Candidate& best = candidates.front();
-    const std::string what = Describe(best.reading, truth, estimate);
-    if (options.as_is) {
-      matched.notes.push_back("relative rotations fit far better if " + what + ": " +
-                              FormatNumber("%.3g", best.residual_deg) + " deg instead of " +
-                              as_is_text);
-      return matched;
-    }
-    matched.notes.push_back(what + ": relative rotations then differ by " +
-                            FormatNumber("%.3g", best.residual_deg) + " deg instead of " +
-                            as_is_text + "; --as-is leaves it");
-    for (StampedPose& pose : matched.ground_truth) {
-      pose = Read(pose, best.reading.truth_order, truth_w_last, best.reading.truth_inverse);
-    }
-    for (StampedPose& pose : matched.estimate) {
-      pose =
-          Read(pose, best.reading.estimate_order, estimate_w_last, best.reading.estimate_inverse);
-    }
-    matched.pairs = AssociatePoses(matched.ground_truth, matched.estimate, options.metrics);
-    return matched;
-  }
-  if (!candidates.empty()) {
-    matched.notes.push_back("relative rotations differ by " + as_is_text + " and fit if " +
-                            Describe(candidates.front().reading, truth, estimate) +
-                            ", but they have one axis alone, which cannot tell that from other "
-                            "axes of the camera: nothing is changed");
-    return matched;
-  }
-  if (options.align_axes && !axes) {
-    throw std::runtime_error(truth.name +
-                             ": its rotations have one axis alone, from which --align-axes cannot "
-                             "find the rotation between the axes; leave it out");
-  }
-  if (!axes) return matched;
-  const Rotation& X = axes->truth_axes_from_estimate_axes;
-  if (options.align_axes) {
-    for (StampedPose& pose : matched.ground_truth) pose.world_from_cam = pose.world_from_cam * X;
-    matched.pairs = AssociatePoses(matched.ground_truth, matched.estimate, options.metrics);
-    matched.notes.push_back("the estimate's axes are those of the truth turned by " + AxesText(X) +
-                            ", which is taken out");
-  } else if (axes_fit) {
-    matched.notes.push_back("the estimate's axes are those of the truth turned by " + AxesText(X) +
-                            ": relative rotations differ by " + as_is_text + ", by " +
-                            FormatNumber("%.3g", axes->residual_deg) +
-                            " deg without it; --align-axes takes it out");
-  } else {
-    // The inverse of one of them with other axes, or qw in the other place.
-    for (const Reading& reading : OtherReadings(truth.file, estimate.file, options)) {
-      const auto fit =
-          FitAxes(ReadPairs(matched.pairs, reading, truth_w_last, estimate_w_last), step);
-      if (!fit || !is_far_better(fit->residual_deg)) continue;
-      matched.notes.push_back("relative rotations differ by " + as_is_text + ", by " +
-                              FormatNumber("%.3g", fit->residual_deg) + " deg if " +
-                              Describe(reading, truth, estimate) + " and its axes are turned by " +
-                              AxesText(fit->truth_axes_from_estimate_axes) +
-                              ": expected are camera->world poses with qx qy qz qw");
-      return matched;
-    }
-  }
-  return matched;
+  return TrajectoryMatcher(truth, estimate, options).Match();
 }
 
 }  // namespace rotslam

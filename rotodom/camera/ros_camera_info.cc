@@ -39,16 +39,23 @@ void SetProjection(const RosCameraInfo& info, Camera& camera) {
   camera.model = CameraModel::kPinhole;
 }
 
+// Region of interest and binning along one axis.
+struct Region {
+  int offset = 0;
+  int size = 0;  // 0: the whole axis
+  int binning = 1;
+};
+
 // The axis' focal length, principal point and size after region of interest and binning.
-void SetRegion(int offset, int region, int binning, double& focal, double& centre, int& size) {
-  if (region > 0) {
-    centre -= offset;
-    size = region;
+void SetRegion(const Region& region, double& focal, double& centre, int& size) {
+  if (region.size > 0) {
+    centre -= region.offset;
+    size = region.size;
   }
-  if (binning <= 1) return;
-  focal /= binning;
-  centre = (centre + 0.5) / binning - 0.5;
-  size /= binning;
+  if (region.binning <= 1) return;
+  focal /= region.binning;
+  centre = (centre + 0.5) / region.binning - 0.5;
+  size /= region.binning;
 }
 
 }  // namespace
@@ -78,8 +85,8 @@ Camera CameraOf(const RosCameraInfo& info, bool is_rectified) {
   }
   camera.width = info.width;
   camera.height = info.height;
-  SetRegion(info.roi_x, info.roi_width, info.binning_x, camera.fx, camera.cx, camera.width);
-  SetRegion(info.roi_y, info.roi_height, info.binning_y, camera.fy, camera.cy, camera.height);
+  SetRegion({info.roi_x, info.roi_width, info.binning_x}, camera.fx, camera.cx, camera.width);
+  SetRegion({info.roi_y, info.roi_height, info.binning_y}, camera.fy, camera.cy, camera.height);
   return camera;
 }
 

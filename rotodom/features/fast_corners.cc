@@ -121,12 +121,13 @@ ROTSLAM_TARGET_AVX2 void ScoreRowAvx2(
 
 // Appends the pixels of a row whose scores exceed those of their eight neighbours. The three rows
 // may be read from -1 to a chunk beyond `count`.
-void AppendMaxima(const Byte* above,
-                  const Byte* here,
-                  const Byte* below,
+void AppendMaxima(const std::array<Byte*, 3>& rows,
                   int count,
                   const cv::Point& origin,
                   std::vector<FastCorner>& corners) {
+  const Byte* above = rows[0];
+  const Byte* here = rows[1];
+  const Byte* below = rows[2];
   for (int x0 = 0; x0 < count; x0 += kChunk) {
     Byte any = 0;
     for (int k = 0; k < kChunk; ++k) any = static_cast<Byte>(any | here[x0 + k]);
@@ -191,7 +192,7 @@ std::vector<FastCorner> FindFastCorners(const cv::Mat& image, const cv::Rect& ar
       std::memset(rows[2] + area.width, 0, kChunk);
     }
     if (y == area.y) continue;
-    AppendMaxima(rows[0], rows[1], rows[2], area.width, cv::Point(area.x, y - 1), corners);
+    AppendMaxima(rows, area.width, cv::Point(area.x, y - 1), corners);
   }
   return corners;
 }

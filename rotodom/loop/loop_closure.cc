@@ -86,14 +86,13 @@ std::optional<std::string> LoopOptions::Problem() const {
 
 LoopClosure::LoopClosure(const Camera& camera,
                          const LoopOptions& options,
-                         const OdometryOptions& odometry,
-                         std::shared_ptr<const Vocabulary> vocabulary,
-                         std::uint64_t seed,
-                         int num_threads)
+                         const FeatureOptions& features,
+                         const VerificationTools& tools,
+                         std::shared_ptr<const Vocabulary> vocabulary)
     : camera_(camera),
       options_(Checked(options)),
-      feature_options_(odometry.features),
-      tools_{odometry.matching, odometry.relative_rotation, seed, num_threads},
+      feature_options_(features),
+      tools_(tools),
       vocabulary_(std::move(vocabulary)),
       finder_(vocabulary_->num_words(), options.candidates),
       unconfirmed_(options.verification) {}
@@ -270,15 +269,12 @@ LoopEvidence LoopClosure::Verify(const Place& place,
   };
   add_rate(frame);
   for (const Features* old_place : old_places) add_rate(old_place->frame);
-  LoopEvidence evidence = VerifyLoop(place.corners,
-                                     old_places,
-                                     cam_from_world,
-                                     rates,
-                                     candidate.num_consistent,
-                                     pieces.Find(candidate.frame.value) == pieces.Find(frame.value),
-                                     camera_,
-                                     options_.verification,
-                                     tools_);
+  const bool are_linked = pieces.Find(candidate.frame.value) == pieces.Find(frame.value);
+  LoopEvidence evidence = VerifyLoop(
+      {place.corners, old_places, cam_from_world, rates, candidate.num_consistent, are_linked},
+      camera_,
+      options_.verification,
+      tools_);
   for (auto* connections : {&evidence.connections, &evidence.unproven}) {
     for (EdgeWithMatches& connection : *connections) {
       connection.matches.pairs = MatchesOfFeatures(

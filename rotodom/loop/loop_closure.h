@@ -90,10 +90,9 @@ class LoopClosure {
   /// Throws std::invalid_argument when an option is out of range.
   LoopClosure(const Camera& camera,
               const LoopOptions& options,
-              const OdometryOptions& odometry,
-              std::shared_ptr<const Vocabulary> vocabulary,
-              std::uint64_t seed,
-              int num_threads);
+              const FeatureOptions& features,
+              const VerificationTools& tools,
+              std::shared_ptr<const Vocabulary> vocabulary);
 
   /// Adds the odometry's estimate of the next frame, and returns the result for the frame before
   /// it: only now is its angular velocity known, which a rolling shutter needs.

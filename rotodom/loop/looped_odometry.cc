@@ -22,21 +22,23 @@ void DropFeaturesOfTracks(FrameRecord& record) {
 
 }  // namespace
 
-LoopedOdometry::LoopedOdometry(const Camera& camera,
-                               const OdometryOptions& odometry,
-                               const LoopOptions& loops,
-                               std::shared_ptr<const Vocabulary> vocabulary,
-                               bool keep_features,
-                               std::uint64_t seed,
-                               int num_threads)
-    : odometry_(camera, odometry, seed, num_threads),
-      window_(odometry.averaging.window),
-      keep_features_(keep_features),
-      orientations_(odometry.averaging, loops, keep_features, num_threads) {
+LoopedOdometry::LoopedOdometry(const Camera& camera, const LoopedOdometryOptions& options)
+    : odometry_(camera, options.odometry, options.seed, options.num_threads),
+      window_(options.odometry.averaging.window),
+      keep_features_(options.keep_features),
+      orientations_(
+          options.odometry.averaging, options.loops, options.keep_features, options.num_threads) {
+  const OdometryOptions& odometry = options.odometry;
   // Without averaging the orientations are those of the odometry, chained.
-  if (!loops.use_loops || odometry.averaging.mode == AveragingMode::kOff) return;
-  if (!vocabulary) vocabulary = std::make_shared<const Vocabulary>(DefaultVocabulary());
-  closure_.emplace(camera, loops, odometry, std::move(vocabulary), seed, num_threads);
+  if (!options.loops.use_loops || odometry.averaging.mode == AveragingMode::kOff) return;
+  closure_.emplace(
+      camera,
+      options.loops,
+      odometry.features,
+      VerificationTools{
+          odometry.matching, odometry.relative_rotation, options.seed, options.num_threads},
+      options.vocabulary ? options.vocabulary
+                         : std::make_shared<const Vocabulary>(DefaultVocabulary()));
 }
 
 LoopedEstimate LoopedOdometry::AddFrame(FrameId frame,

@@ -29,6 +29,15 @@ struct LoopedEstimate {
   bool has_averaged = false;     // a loop has changed orientations of older frames
 };
 
+struct LoopedOdometryOptions {
+  OdometryOptions odometry = {};
+  LoopOptions loops = {};
+  std::shared_ptr<const Vocabulary> vocabulary = nullptr;  // null: DefaultVocabulary
+  bool keep_features = true;                               // for tracks
+  std::uint64_t seed = 1;
+  int num_threads = 1;
+};
+
 struct FrameRecord;
 
 /// Rotational odometry with loop closure: loops distribute the drift over all orientations
@@ -37,15 +46,7 @@ struct FrameRecord;
 class LoopedOdometry {
  public:
   /// Throws std::invalid_argument when an option or the camera is out of range.
-  /// @param vocabulary     null: DefaultVocabulary.
-  /// @param keep_features  for tracks.
-  LoopedOdometry(const Camera& camera,
-                 const OdometryOptions& odometry,
-                 const LoopOptions& loops,
-                 std::shared_ptr<const Vocabulary> vocabulary,
-                 bool keep_features,
-                 std::uint64_t seed,
-                 int num_threads);
+  LoopedOdometry(const Camera& camera, const LoopedOdometryOptions& options);
 
   /// Adds the next frame, as RotationalOdometry::AddFrame.
   /// @param record  when set, receives the input of Replay.

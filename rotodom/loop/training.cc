@@ -168,19 +168,23 @@ class Divider {
   std::vector<std::uint8_t> parts_;
 };
 
+struct Level {
+  const std::vector<Cluster>& clusters;
+  std::uint64_t seed = 1;
+};
+
 // The clusters of one level divided, side by side; those too small to be divided give nothing.
 std::vector<Division> DivideLevel(const std::vector<BinaryDescriptor>& descriptors,
-                                  const std::vector<Cluster>& clusters,
-                                  std::uint64_t level_seed,
+                                  const Level& level,
                                   const TrainingOptions& options,
                                   int num_threads,
                                   Members& members) {
-  std::vector<Division> divisions(clusters.size());
-  ParallelFor(static_cast<int>(clusters.size()), num_threads, [&](int index) {
-    const Cluster& cluster = clusters[index];
+  std::vector<Division> divisions(level.clusters.size());
+  ParallelFor(static_cast<int>(level.clusters.size()), num_threads, [&](int index) {
+    const Cluster& cluster = level.clusters[index];
     if (cluster.size() < static_cast<std::size_t>(options.min_descriptors)) return;
     const std::span<std::uint32_t> part = std::span(members).subspan(cluster.begin, cluster.size());
-    SplitMix64 random(level_seed ^ static_cast<std::uint64_t>(index));
+    SplitMix64 random(level.seed ^ static_cast<std::uint64_t>(index));
     Division division = Divider(descriptors, part, options).Divide(random.Next());
     if (division.centers.size() > 1) divisions[index] = std::move(division);
   });
@@ -202,7 +206,7 @@ VocabularyTree GrowTree(const std::vector<BinaryDescriptor>& descriptors,
   for (int level = 0; level < options.depth && !clusters.empty(); ++level) {
     if (progress) progress(level, options.depth);
     const std::vector<Division> divisions =
-        DivideLevel(descriptors, clusters, random.Next(), options, num_threads, members);
+        DivideLevel(descriptors, {clusters, random.Next()}, options, num_threads, members);
     std::vector<Cluster> next;
     for (std::size_t k = 0; k < clusters.size(); ++k) {
       tree.num_children.push_back(static_cast<std::uint8_t>(divisions[k].centers.size()));

@@ -89,13 +89,10 @@ class Verifier {
                                          const KeypointPairs& keypoints,
                                          const Rotation& predicted_view_from_old,
                                          const std::vector<MatchNoise>& noise) const {
-    return EstimateEdge(old_place,
-                        view_,
-                        keypoints,
+    return EstimateEdge({old_place, view_, keypoints, noise},
                         predicted_view_from_old,
                         camera_.MeanFocal(),
-                        {tools_.relative_rotation, tools_.seed, tools_.num_threads},
-                        noise);
+                        {tools_.relative_rotation, tools_.seed, tools_.num_threads});
   }
 
   // The edge estimated with the covariances of blurred corners, if it is certain enough to confirm
@@ -226,6 +223,40 @@ bool IsProven(const std::vector<PlaceEdge>& place_edges,
   });
 }
 
+// The edges from the old places. Neighbours can only confirm the edge of the most similar place:
+// without that edge there are none.
+std::vector<PlaceEdge> EstimatePlaceEdges(const PlaceComparison& places, const Verifier& verifier) {
+  const Rotation& present_view_from_world = places.cam_from_world.at(places.view.frame);
+  std::vector<PlaceEdge> place_edges;
+  for (const Features* old_place : places.old_places) {
+    const Rotation& old_from_world = places.cam_from_world.at(old_place->frame);
+    auto place_edge =
+        verifier.Estimate(*old_place, old_from_world, present_view_from_world, places.are_linked);
+    if (place_edge) place_edges.push_back(*std::move(place_edge));
+    if (place_edges.empty()) break;
+  }
+  return place_edges;
+}
+
+// Sorts the agreeing edges: certain ones first, then proven ones, then by their covariance.
+// @return  by edge, whether it is proven.
+std::vector<bool> SortByProof(const std::vector<PlaceEdge>& place_edges,
+                              double max_cycle_deg,
+                              std::vector<int>& agreeing) {
+  std::vector<bool> is_proven(place_edges.size(), false);
+  for (const int index : agreeing) {
+    is_proven[index] = IsProven(place_edges, agreeing, index, max_cycle_deg);
+  }
+  const auto rank = [&](int index) {
+    const PlaceEdge& place_edge = place_edges[index];
+    return std::tuple(
+        !place_edge.is_certain, !is_proven[index], place_edge.connection.edge.covariance.trace());
+  };
+  std::stable_sort(
+      agreeing.begin(), agreeing.end(), [&](int a, int b) { return rank(a) < rank(b); });
+  return is_proven;
+}
+
 }  // namespace
 
 std::optional<std::string> VerificationOptions::Problem() const {
@@ -293,31 +324,17 @@ ScaledLoop ScaleRotations(const RotationMap& cam_from_world,
   return {scale, rest.AngleDeg()};
 }
 
-LoopEvidence VerifyLoop(const Features& view,
-                        std::span<const Features* const> old_places,
-                        const RotationMap& cam_from_world,
-                        const RotationRates& rates,
-                        int num_consistent,
-                        bool are_linked,
+LoopEvidence VerifyLoop(const PlaceComparison& places,
                         const Camera& camera,
                         const VerificationOptions& options,
                         const VerificationTools& tools) {
-  const Verifier verifier(view, rates, camera, options, tools);
-  const Rotation& present_view_from_world = cam_from_world.at(view.frame);
   LoopEvidence evidence;
-  evidence.match = old_places.front()->frame;
-  std::vector<PlaceEdge> place_edges;
-  for (const Features* old_place : old_places) {
-    const Rotation& old_from_world = cam_from_world.at(old_place->frame);
-    auto place_edge =
-        verifier.Estimate(*old_place, old_from_world, present_view_from_world, are_linked);
-    if (place_edge) place_edges.push_back(*std::move(place_edge));
-    // Neighbours can only confirm the edge of the most similar place. Without that edge they are
-    // not matched.
-    if (place_edges.empty()) return evidence;
-  }
+  evidence.match = places.old_places.front()->frame;
+  std::vector<PlaceEdge> place_edges =
+      EstimatePlaceEdges(places, Verifier(places.view, places.rates, camera, options, tools));
   const auto scale_rotations = [&](const RelativeRotation& edge) {
-    return are_linked ? ScaleRotations(cam_from_world, edge, options.max_turn_error) : ScaledLoop();
+    return places.are_linked ? ScaleRotations(places.cam_from_world, edge, options.max_turn_error)
+                             : ScaledLoop();
   };
   const auto certain =
       std::find_if(place_edges.begin(), place_edges.end(), [](const PlaceEdge& place_edge) {
@@ -330,33 +347,24 @@ LoopEvidence VerifyLoop(const Features& view,
       std::abs(scale_rotations(certain->connection.edge).turn_scale - 1.0);
   std::vector<int> agreeing = LargestAgreeingSet(
       place_edges, {options.max_cycle_deg, options.max_cycle_sigmas, rotation_error});
-  std::vector<bool> is_proven(place_edges.size(), false);
-  for (const int index : agreeing) {
-    is_proven[index] = IsProven(place_edges, agreeing, index, options.max_cycle_deg);
-  }
-  const auto rank = [&](int index) {
-    const PlaceEdge& place_edge = place_edges[index];
-    return std::tuple(
-        !place_edge.is_certain, !is_proven[index], place_edge.connection.edge.covariance.trace());
-  };
-  std::stable_sort(
-      agreeing.begin(), agreeing.end(), [&](int a, int b) { return rank(a) < rank(b); });
+  const std::vector<bool> is_proven = SortByProof(place_edges, options.max_cycle_deg, agreeing);
   const PlaceEdge& best = place_edges[agreeing.front()];
   const RelativeRotation& edge =
       (is_proven[agreeing.front()] ? *best.blurred : best.connection).edge;
   evidence.match = edge.i;
   evidence.num_inliers = edge.num_inliers;
-  const Rotation view_from_world = edge.j_from_i * cam_from_world.at(edge.i);
+  const Rotation view_from_world = edge.j_from_i * places.cam_from_world.at(edge.i);
+  const Rotation& present_view_from_world = places.cam_from_world.at(places.view.frame);
   evidence.angle_deg = (view_from_world * present_view_from_world.Inverse()).AngleDeg();
   evidence.scaled = scale_rotations(edge);
-  const int num_frames = view.frame.value - evidence.match.value;
+  const int num_frames = places.view.frame.value - evidence.match.value;
   const double drift_deg = options.max_drift_deg + options.max_drift_deg_per_sqrt_frame *
                                                        std::sqrt(static_cast<double>(num_frames));
   int num_inliers = 0;
   for (const int index : agreeing) num_inliers += place_edges[index].connection.edge.num_inliers;
   evidence.accepted = static_cast<int>(agreeing.size()) >= options.min_edges &&
-                      (num_inliers >= options.sure_inliers || num_consistent > 1) &&
-                      (!are_linked || evidence.scaled.angle_deg <= drift_deg);
+                      (num_inliers >= options.sure_inliers || places.num_consistent > 1) &&
+                      (!places.are_linked || evidence.scaled.angle_deg <= drift_deg);
   for (const int index : agreeing) {
     if (!place_edges[index].is_certain) break;
     if (is_proven[index]) {

@@ -101,6 +101,19 @@ struct LoopEvidence {
   std::vector<EdgeWithMatches> unproven;
 };
 
+/// A place and the older ones that it is compared with.
+struct PlaceComparison {
+  const Features& view;                         // described features of the present place
+  std::span<const Features* const> old_places;  // described; the candidate first, then neighbours
+  const RotationMap& cam_from_world;  // present orientations of all of them and of those between
+  const RotationRates& rates;         // angular velocities of the view and old places, where known
+  int num_consistent = 0;             // as in LoopCandidate
+  // The two places are in one component of the view-graph, so that their orientations are wrong by
+  // drift only.
+  bool are_linked = false;
+};
+
+/// How places are matched and relative rotations estimated.
 struct VerificationTools {
   MatchingOptions matching;
   RelativeRotationOptions relative_rotation;
@@ -111,19 +124,7 @@ struct VerificationTools {
 /// Verifies a candidate geometrically: matches descriptors and estimates relative rotations as the
 /// odometry does, and tests whether enough of the edges are consistent with each other and with the
 /// orientations between the two places.
-/// @param view            described features of the present place.
-/// @param old_places      described features; the candidate first, then its neighbours, if any.
-/// @param cam_from_world  present orientations of all of them, and of the frames in between.
-/// @param rates           angular velocities of the view and of old places, where known.
-/// @param num_consistent  as in LoopCandidate.
-/// @param are_linked      the two places are in one component of the view-graph, so that their
-///                        orientations are wrong by drift only.
-LoopEvidence VerifyLoop(const Features& view,
-                        std::span<const Features* const> old_places,
-                        const RotationMap& cam_from_world,
-                        const RotationRates& rates,
-                        int num_consistent,
-                        bool are_linked,
+LoopEvidence VerifyLoop(const PlaceComparison& places,
                         const Camera& camera,
                         const VerificationOptions& options,
                         const VerificationTools& tools);

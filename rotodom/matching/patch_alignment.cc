@@ -80,7 +80,25 @@ struct Bilinear {
   float NoiseLeft() const { return w00 * w00 + w10 * w10 + w01 * w01 + w11 * w11; }
 };
 
-// Mean of that ratio over all fractions of a pixel.
+// Where the pixels of a patch of half side `half` lie around a position.
+struct PixelGrid {
+  PixelGrid(const Eigen::Vector2f& center, int half)
+      : x(static_cast<int>(std::floor(center.x() - static_cast<float>(half)))),
+        y(static_cast<int>(std::floor(center.y() - static_cast<float>(half)))),
+        weights(center.x() - static_cast<float>(half) - static_cast<float>(x),
+                center.y() - static_cast<float>(half) - static_cast<float>(y)) {}
+  int x;
+  int y;
+  Bilinear weights;
+};
+
+// A row of the patch interpolated from the two rows of pixels around it.
+Row Interpolated(const float* above, const float* below, const Bilinear& weights) {
+  return weights.w00 * RowAt(above) + weights.w10 * RowAt(above + 1) + weights.w01 * RowAt(below) +
+         weights.w11 * RowAt(below + 1);
+}
+
+// Mean of Bilinear::NoiseLeft over all fractions of a pixel.
 constexpr float kMeanNoiseLeft = 4.0F / 9.0F;
 
 float SampleAt(const cv::Mat& image, float x, float y) {
@@ -101,13 +119,9 @@ using SampledPatch = std::array<float, static_cast<std::size_t>(kSampled) * kSam
 std::optional<float> SampleShifted(const cv::Mat& image,
                                    const Eigen::Vector2f& center,
                                    SampledPatch& sampled) {
-  const float left = center.x() - static_cast<float>(kHalf + 1);
-  const float top = center.y() - static_cast<float>(kHalf + 1);
-  const int x = static_cast<int>(std::floor(left));
-  const int y = static_cast<int>(std::floor(top));
+  const auto [x, y, weights] = PixelGrid(center, kHalf + 1);
   Window<kSampled + 1> window;
   if (!window.Load(image, x, y)) return std::nullopt;
-  const Bilinear weights(left - static_cast<float>(x), top - static_cast<float>(y));
   for (int row = 0; row < kSampled; ++row) {
     const float* above = window.row(row);
     const float* below = window.row(row + 1);
@@ -143,8 +157,24 @@ std::optional<float> SampleWarped(const cv::Mat& image,
   return kMeanNoiseLeft;
 }
 
+// Inverse of the Hessian; nullopt where the patch has too little structure in some direction.
+std::optional<Eigen::Matrix2f> InverseIfStructured(float xx, float xy, float yy) {
+  Eigen::Matrix2f hessian;
+  hessian << xx, xy, xy, yy;
+  const float half_trace = 0.5F * hessian.trace();
+  const float determinant = hessian.determinant();
+  const float root = std::sqrt(std::max(0.0F, half_trace * half_trace - determinant));
+  const float smallest = half_trace - root;
+  if (!(smallest > kMinStructure * (half_trace + root)) ||
+      !(smallest > kMinGradientEnergy * kNumPixels)) {
+    return std::nullopt;
+  }
+  return hessian.inverse();
+}
+
 }  // namespace
 
+// Longer than a screen: three passes over the rows share sums that stay in registers.
 std::optional<PatchTemplate> PatchTemplate::Sample(const cv::Mat& image,
                                                    const Eigen::Vector2d& center_px,
                                                    const Eigen::Matrix2d& patch_from_view) {
@@ -214,77 +244,26 @@ std::optional<PatchTemplate> PatchTemplate::Sample(const cv::Mat& image,
     xy += gradient_x * gradient_y;
     yy += gradient_y.square();
   }
-  Eigen::Matrix2f hessian;
-  hessian << xx.sum(), xy.sum(), xy.sum(), yy.sum();
-  const float half_trace = 0.5F * hessian.trace();
-  const float determinant = hessian.determinant();
-  const float root = std::sqrt(std::max(0.0F, half_trace * half_trace - determinant));
-  const float smallest = half_trace - root;
-  if (!(smallest > kMinStructure * (half_trace + root)) ||
-      !(smallest > kMinGradientEnergy * kNumPixels)) {
-    return std::nullopt;
-  }
-  patch.inverse_hessian_ = hessian.inverse();
+  const auto inverse = InverseIfStructured(xx.sum(), xy.sum(), yy.sum());
+  if (!inverse) return std::nullopt;
+  patch.inverse_hessian_ = *inverse;
   return patch;
 }
 
 struct PatchAligner {
-  static std::optional<PatchAlignment> Align(const PatchTemplate& patch,
-                                             const cv::Mat& image,
-                                             const Eigen::Vector2f& start,
-                                             float max_step) {
-    Window<kPatchSide + 1> window;
-    Eigen::Vector2f center = start;
-    int loaded_x = -1000;
-    int loaded_y = -1000;
-    float sum = 0.0F;
-    float along = 0.0F;
+  // Sums over the pixels of the image under the patch.
+  struct Sums {
+    float values = 0.0F;
+    float along = 0.0F;  // products with the patch
     float squares = 0.0F;
-    float noise_left = kMeanNoiseLeft;
-    for (int iteration = 0;; ++iteration) {
-      const float left = center.x() - static_cast<float>(kHalf);
-      const float top = center.y() - static_cast<float>(kHalf);
-      const int x = static_cast<int>(std::floor(left));
-      const int y = static_cast<int>(std::floor(top));
-      if (x != loaded_x || y != loaded_y) {
-        if (!window.Load(image, x, y)) return std::nullopt;
-        loaded_x = x;
-        loaded_y = y;
-      }
-      const Bilinear weights(left - static_cast<float>(x), top - static_cast<float>(y));
-      Row b_x = Row::Zero();
-      Row b_y = Row::Zero();
-      Row row_sum = Row::Zero();
-      Row row_along = Row::Zero();
-      Row row_squares = Row::Zero();
-      for (int row = 0; row < kPatchSide; ++row) {
-        const float* above = window.row(row);
-        const float* below = window.row(row + 1);
-        const Row values = weights.w00 * RowAt(above) + weights.w10 * RowAt(above + 1) +
-                           weights.w01 * RowAt(below) + weights.w11 * RowAt(below + 1);
-        b_x += values * Eigen::Map<const Row>(patch.gradient_x_.data() + row * kRow);
-        b_y += values * Eigen::Map<const Row>(patch.gradient_y_.data() + row * kRow);
-        row_along += values * Eigen::Map<const Row>(patch.values_.data() + row * kRow);
-        row_sum += values;
-        row_squares += values.square();
-      }
-      const Eigen::Vector2f b(b_x.sum(), b_y.sum());
-      const Eigen::Vector2f step = -patch.inverse_hessian_ * b;
-      const bool last = step.squaredNorm() < kMinStepPx * kMinStepPx;
-      if (last || iteration == kMaxIterations) {
-        // The padding column is no part of the patch.
-        row_sum[kRow - 1] = 0.0F;
-        row_squares[kRow - 1] = 0.0F;
-        sum = row_sum.sum();
-        squares = row_squares.sum();
-        along = row_along.sum();
-        noise_left = 0.5F * (patch.noise_left_ + weights.NoiseLeft());
-        if (last) center += step;
-        break;
-      }
-      center += step;
-      if (!((center - start).squaredNorm() <= max_step * max_step)) return std::nullopt;
-    }
+  };
+
+  static std::optional<PatchAlignment> AlignmentAt(const PatchTemplate& patch,
+                                                   const Eigen::Vector2f& center,
+                                                   const Sums& sums,
+                                                   const Bilinear& weights) {
+    const auto& [sum, along, squares] = sums;
+    const float noise_left = 0.5F * (patch.noise_left_ + weights.NoiseLeft());
     const float variance = squares - sum * sum / kNumPixels;
     if (!(variance > 0.0F) || !(along > 0.0F)) return std::nullopt;
     PatchAlignment alignment;
@@ -302,6 +281,50 @@ struct PatchAligner {
     return alignment;
   }
 
+  static std::optional<PatchAlignment> Align(const PatchTemplate& patch,
+                                             const cv::Mat& image,
+                                             const Eigen::Vector2f& start,
+                                             float max_step) {
+    Window<kPatchSide + 1> window;
+    Eigen::Vector2f center = start;
+    int loaded_x = -1000;
+    int loaded_y = -1000;
+    for (int iteration = 0;; ++iteration) {
+      const auto [x, y, weights] = PixelGrid(center, kHalf);
+      if (x != loaded_x || y != loaded_y) {
+        if (!window.Load(image, x, y)) return std::nullopt;
+        loaded_x = x;
+        loaded_y = y;
+      }
+      Row b_x = Row::Zero();
+      Row b_y = Row::Zero();
+      Row row_sum = Row::Zero();
+      Row row_along = Row::Zero();
+      Row row_squares = Row::Zero();
+      for (int row = 0; row < kPatchSide; ++row) {
+        const Row values = Interpolated(window.row(row), window.row(row + 1), weights);
+        b_x += values * Eigen::Map<const Row>(patch.gradient_x_.data() + row * kRow);
+        b_y += values * Eigen::Map<const Row>(patch.gradient_y_.data() + row * kRow);
+        row_along += values * Eigen::Map<const Row>(patch.values_.data() + row * kRow);
+        row_sum += values;
+        row_squares += values.square();
+      }
+      const Eigen::Vector2f b(b_x.sum(), b_y.sum());
+      const Eigen::Vector2f step = -patch.inverse_hessian_ * b;
+      const bool last = step.squaredNorm() < kMinStepPx * kMinStepPx;
+      if (last || iteration == kMaxIterations) {
+        // The padding column is no part of the patch.
+        row_sum[kRow - 1] = 0.0F;
+        row_squares[kRow - 1] = 0.0F;
+        if (last) center += step;
+        return AlignmentAt(
+            patch, center, {row_sum.sum(), row_along.sum(), row_squares.sum()}, weights);
+      }
+      center += step;
+      if (!((center - start).squaredNorm() <= max_step * max_step)) return std::nullopt;
+    }
+  }
+
   // Derivatives of a patch's values by a shift of one pixel in x and y, a stretch along the flow,
   // and shears along the flow that grow with x and y.
   static constexpr int kNumModes = 5;
@@ -316,17 +339,14 @@ struct PatchAligner {
     float noise_left = 1.0F;
   };
 
+  // Longer than a screen: one pass over the rows holds all sums, which the second part reduces.
   static std::optional<ModeEquations> FormModeEquations(const PatchTemplate& patch,
                                                         const cv::Mat& image,
                                                         const Eigen::Vector2f& center,
                                                         const Eigen::Vector2f& along) {
-    const float left = center.x() - static_cast<float>(kHalf);
-    const float top = center.y() - static_cast<float>(kHalf);
-    const int x = static_cast<int>(std::floor(left));
-    const int y = static_cast<int>(std::floor(top));
+    const auto [x, y, weights] = PixelGrid(center, kHalf);
     Window<kPatchSide + 1> window;
     if (!window.Load(image, x, y)) return std::nullopt;
-    const Bilinear weights(left - static_cast<float>(x), top - static_cast<float>(y));
 
     const Row mask = InsidePatch();
     const Row dx = Row::LinSpaced(-kHalf, kRow - 1 - kHalf);
@@ -341,10 +361,7 @@ struct PatchAligner {
     Row image_share = Row::Zero();
     Row image_squares = Row::Zero();
     for (int row = 0; row < kPatchSide; ++row) {
-      const float* above = window.row(row);
-      const float* below = window.row(row + 1);
-      const Row image_values = mask * (weights.w00 * RowAt(above) + weights.w10 * RowAt(above + 1) +
-                                       weights.w01 * RowAt(below) + weights.w11 * RowAt(below + 1));
+      const Row image_values = mask * Interpolated(window.row(row), window.row(row + 1), weights);
       const Row values = RowAt(patch.values_.data() + row * kRow);
       const Row gradient_x = RowAt(patch.gradient_x_.data() + row * kRow) +
                              mask * patch.mean_gradient_.x() + patch.gradient_share_.x() * values;

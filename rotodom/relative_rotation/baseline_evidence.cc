@@ -109,15 +109,15 @@ std::optional<std::string> BaselineTestOptions::Problem() const {
 BaselineEvidence TestBaseline(const PairArrays& pairs,
                               std::span<const KeypointCovariances> covariances,
                               const BaselineHypotheses& hypotheses,
-                              double shared_error_px,
-                              double focal_px,
+                              const PixelErrors& pixels,
                               const BaselineTestOptions& options) {
   if (!covariances.empty() && std::ssize(covariances) != pairs.size()) {
     throw std::invalid_argument("TestBaseline: not one covariance per pair");
   }
   if (pairs.size() == 0) return {};
   const double lens_error = options.lens_error * hypotheses.rotation.Angle();
-  const Whitening whiten(hypotheses, std::hypot(shared_error_px / focal_px, lens_error), focal_px);
+  const Whitening whiten(
+      hypotheses, std::hypot(pixels.shared_px / pixels.focal_px, lens_error), pixels.focal_px);
   std::vector<WhitenedErrors> errors;
   errors.reserve(pairs.size());
   for (int k = 0; k < pairs.size(); ++k) {

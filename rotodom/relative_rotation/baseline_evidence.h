@@ -40,6 +40,14 @@ struct KeypointCovariances {
   Eigen::Matrix2d j_px = Eigen::Matrix2d::Identity();
 };
 
+/// Errors of image positions.
+struct PixelErrors {
+  double focal_px = 0.0;  // pixels per radian
+  // Standard deviation of errors that neighbouring matches have in common, which may therefore
+  // point along the epipolar lines.
+  double shared_px = 0.0;
+};
+
 /// The best model without and with a baseline for the same matches.
 struct BaselineHypotheses {
   Rotation rotation;       // j_from_i without a baseline
@@ -68,10 +76,7 @@ struct BaselineEvidence {
 /// difference equals the residual sum of the epipolar model in expectation; size and distribution
 /// of the noise need not be known. The epipolar model selects the direction with the least error
 /// across, so the threshold is that for the maximum over all directions.
-/// @param covariances      one per pair, or none: all alike.
-/// @param shared_error_px  standard deviation of errors that neighbouring matches have in common,
-///                         which may therefore point along the lines.
-/// @param focal_px         pixels per radian.
+/// @param covariances  one per pair, or none: all alike.
 /// Error:   without allowances for anisotropy and shared errors, 2.5 to 3.5 % of pairs without a
 ///          baseline fail at a false-alarm rate of 5 %, and 1.0 to 1.3 % at 1 % (baseline tests).
 /// Source:  Torr, Geometric motion segmentation and model selection, 1998, has the two models; the
@@ -79,8 +84,7 @@ struct BaselineEvidence {
 BaselineEvidence TestBaseline(const PairArrays& pairs,
                               std::span<const KeypointCovariances> covariances,
                               const BaselineHypotheses& hypotheses,
-                              double shared_error_px,
-                              double focal_px,
+                              const PixelErrors& pixels,
                               const BaselineTestOptions& options);
 
 }  // namespace rotslam

@@ -110,18 +110,24 @@ double Quantile(std::vector<double> values, double part) {
   return *at;
 }
 
+// Bounds of the distances that a score counts, rad.
+struct ScoreBounds {
+  // Standard deviation of the distances. Flow of that size may have any direction; otherwise a
+  // model would be preferred that explains rotation by translation, so that all flow has one
+  // direction.
+  double noise = 0.0;
+  double threshold = 0.0;  // of an inlier
+  double finest = 0.0;     // below this all distances are alike
+};
+
 // ScoreEpipolar with the distances to the epipolar half-lines, which hold the points in front of
 // both cameras, for the sign of the direction that fits better. A plane has two motions that fit
 // all its epipolar lines, but with the wrong one about half of it is behind the cameras.
-// @param noise  standard deviation of the distances. Flow of that size may have any direction;
-//               otherwise a model would be preferred that explains rotation by translation, so that
-//               all flow has one direction.
 HypothesisScore ScoreHalfLines(const PairArrays& pairs,
                                const EpipolarModel& model,
                                const std::vector<double>& squared_distances,
-                               double noise,
-                               double threshold,
-                               double finest) {
+                               const ScoreBounds& bounds) {
+  const auto& [noise, threshold, finest] = bounds;
   // Distances contain the noise of both views, so flows are divided by the root of two below.
   constexpr double kSigmas = 2.0;
   const double any_way = kSigmas * noise;
@@ -264,7 +270,7 @@ class Search {
   HypothesisScore ScoreOf(const EpipolarModel& model) const {
     const std::vector<double> squared_distances = SquaredDistances(pairs_, model);
     const double noise = NoiseOf(squared_distances, threshold_, smallest_noise_);
-    return ScoreHalfLines(pairs_, model, squared_distances, noise, threshold_, finest_);
+    return ScoreHalfLines(pairs_, model, squared_distances, {noise, threshold_, finest_});
   }
 
   // The 30th percentile of the lengths of the flow, rad.

@@ -448,7 +448,7 @@ auto WithBestLoops(const Function& function) {
 
 }  // namespace
 
-PairArrays::PairArrays(const std::vector<BearingPair>& pairs) {
+PairArrays::PairArrays(std::span<const BearingPair> pairs) {
   const bool weighted = std::any_of(
       pairs.begin(), pairs.end(), [](const BearingPair& pair) { return pair.noise.has_value(); });
   Allocate(static_cast<int>(pairs.size()), weighted);

@@ -21,7 +21,7 @@ struct EpipolarModel {
 class PairArrays {
  public:
   PairArrays() = default;
-  explicit PairArrays(const std::vector<BearingPair>& pairs);
+  explicit PairArrays(std::span<const BearingPair> pairs);
   /// Copies some of the pairs, in the order of `indices`.
   PairArrays(const PairArrays& all, std::span<const int> indices);
 

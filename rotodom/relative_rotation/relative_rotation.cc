@@ -26,20 +26,13 @@ bool RotationExplains(const std::vector<double>& squared_distances,
   return RotationCriterion(squared_flows, noise) < EpipolarCriterion(squared_distances, noise);
 }
 
-// Tests whether the members' matches show a baseline.
-BaselineEvidence EvidenceOf(const PairArrays& members,
-                            const std::vector<int>& member_indices,
-                            std::span<const KeypointCovariances> covariances,
-                            const BaselineHypotheses& hypotheses,
-                            double focal_px,
-                            const RelativeRotationOptions& options) {
+std::vector<KeypointCovariances> SelectCovariances(
+    const std::vector<int>& members, std::span<const KeypointCovariances> covariances) {
   std::vector<KeypointCovariances> of_members;
-  if (!covariances.empty()) {
-    of_members.reserve(member_indices.size());
-    for (const int index : member_indices) of_members.push_back(covariances[index]);
-  }
-  return TestBaseline(
-      members, of_members, hypotheses, options.shared_error_px, focal_px, options.baseline);
+  if (covariances.empty()) return of_members;
+  of_members.reserve(members.size());
+  for (const int index : members) of_members.push_back(covariances[index]);
+  return of_members;
 }
 
 // Share of the epipolar model's inliers that a rotation must explain to replace it. A test between
@@ -66,8 +59,11 @@ Eigen::Vector3d WithForwardSign(const PairArrays& pairs,
   return votes >= 0 ? model.direction : Eigen::Vector3d(-model.direction);
 }
 
-void CheckPairs(const std::vector<BearingPair>& pairs) {
-  for (const BearingPair& pair : pairs) {
+void CheckMatches(const MatchedBearings& matches) {
+  if (!matches.covariances.empty() && matches.covariances.size() != matches.pairs.size()) {
+    throw std::invalid_argument("EstimateRelativeRotation: not one covariance per pair");
+  }
+  for (const BearingPair& pair : matches.pairs) {
     if (!pair.bearing_i.allFinite() || !pair.bearing_j.allFinite()) {
       throw std::invalid_argument("EstimateRelativeRotation: a bearing is not finite");
     }
@@ -93,6 +89,59 @@ bool IsFixed(const Eigen::Matrix3d& information) {
   return eigenvalues[0] > 1e-10 * eigenvalues[2];
 }
 
+// The model refined on the members of its consensus.
+struct RefinedMembers {
+  PairArrays arrays;
+  double loss = 0.0;
+  EpipolarFit epipolar;
+  std::vector<double> squared_distances;  // to `epipolar`, rad^2
+  double noise = 0.0;                     // standard deviation of these distances, rad
+};
+
+RefinedMembers RefineMembers(const PairArrays& all,
+                             const Consensus& consensus,
+                             double threshold,
+                             double smallest_noise) {
+  RefinedMembers refined;
+  refined.arrays = PairArrays(all, consensus.members);
+  refined.loss =
+      kLossSigmas *
+      NoiseOf(SquaredDistances(refined.arrays, consensus.model), threshold, smallest_noise);
+  refined.epipolar =
+      RefineEpipolar(refined.arrays, consensus.model, refined.loss, kRefineIterations, 1e-9);
+  refined.squared_distances = SquaredDistances(refined.arrays, refined.epipolar.model);
+  refined.noise = NoiseOf(refined.squared_distances, threshold, smallest_noise);
+  return refined;
+}
+
+// Sets the rotation of the model without a baseline.
+void SelectRotation(const RotationFit& rotation,
+                    double noise,
+                    double shared_error,
+                    RelativeRotationEstimate& estimate) {
+  // A baseline whose flow is below the shared error is absorbed by the rotation; on rendered
+  // gimbals by half.
+  const double absorbed = 0.5 * shared_error;
+  estimate.j_from_i = rotation.j_from_i;
+  estimate.covariance = 2.0 * noise * noise * rotation.H.inverse() +
+                        absorbed * absorbed * Eigen::Matrix3d::Identity();
+}
+
+// Sets the rotation of the epipolar model and, where there is a baseline, its direction.
+void SelectEpipolar(const PairArrays& all,
+                    const EpipolarFit& epipolar,
+                    double noise,
+                    RelativeRotationEstimate& estimate) {
+  const Eigen::Matrix<double, 5, 5> covariance = noise * noise * epipolar.normal.H.inverse();
+  estimate.j_from_i = epipolar.model.j_from_i;
+  estimate.covariance = covariance.topLeftCorner<3, 3>();
+  if (estimate.rotation_only) return;
+  estimate.translation_direction = WithForwardSign(all, estimate.inliers, epipolar.model);
+  const Eigen::Matrix<double, 3, 2> basis = TangentBasis(epipolar.model.direction);
+  estimate.translation_covariance =
+      basis * covariance.bottomRightCorner<2, 2>() * basis.transpose();
+}
+
 // Refines the model on its members, tests the baseline, and selects the rotation.
 std::optional<RelativeRotationEstimate> EstimateFrom(
     const PairArrays& all,
@@ -101,19 +150,16 @@ std::optional<RelativeRotationEstimate> EstimateFrom(
     const RelativeRotationOptions& options,
     std::span<const KeypointCovariances> covariances) {
   const double threshold = options.inlier_px / focal_px;
-  const double smallest_noise = kMinNoisePx / focal_px;
+  const double shared_error = options.shared_error_px / focal_px;
   if (consensus.num_inliers < options.min_inliers) return std::nullopt;
-  const PairArrays arrays(all, consensus.members);
-
-  const double loss =
-      kLossSigmas * NoiseOf(SquaredDistances(arrays, consensus.model), threshold, smallest_noise);
-  const EpipolarFit epipolar =
-      RefineEpipolar(arrays, consensus.model, loss, kRefineIterations, 1e-9);
+  const auto [arrays, loss, epipolar, squared_distances, noise] =
+      RefineMembers(all, consensus, threshold, kMinNoisePx / focal_px);
   RelativeRotationEstimate estimate;
   estimate.num_samples = consensus.num_samples;
   estimate.excess = consensus.excess;
+  estimate.translation_direction.setZero();
+  estimate.translation_covariance.setZero();
 
-  const std::vector<double> squared_distances = SquaredDistances(arrays, epipolar.model);
   const std::vector<double> squared_flows = SquaredFlows(arrays, epipolar.model.j_from_i);
   double squared_flow = 0.0;
   for (int index = 0; index < arrays.size(); ++index) {
@@ -124,75 +170,50 @@ std::optional<RelativeRotationEstimate> EstimateFrom(
   if (static_cast<int>(estimate.inliers.size()) < options.min_inliers) return std::nullopt;
   const double num_inliers = static_cast<double>(estimate.inliers.size());
   estimate.parallax_px = std::sqrt(squared_flow / num_inliers) * focal_px;
-  const double noise = NoiseOf(squared_distances, threshold, smallest_noise);
   estimate.noise_px = noise * focal_px;
 
   const RotationFit rotation =
       RefineRotation(arrays, epipolar.model.j_from_i, 2.0 * loss, kRefineIterations);
-  estimate.baseline = EvidenceOf(arrays,
-                                 consensus.members,
-                                 covariances,
-                                 {rotation.j_from_i, epipolar.model},
-                                 focal_px,
-                                 options);
-  const int num_turned =
-      NumBelow(SquaredFlows(arrays, rotation.j_from_i), 2.0 * threshold * threshold);
+  estimate.baseline = TestBaseline(arrays,
+                                   SelectCovariances(consensus.members, covariances),
+                                   {rotation.j_from_i, epipolar.model},
+                                   {focal_px, options.shared_error_px},
+                                   options.baseline);
+  const std::vector<double> flows_by_rotation = SquaredFlows(arrays, rotation.j_from_i);
   estimate.rotation_only =
-      !estimate.baseline.ShowsBaseline() && num_turned >= kMinShareByRotation * num_inliers;
+      !estimate.baseline.ShowsBaseline() &&
+      NumBelow(flows_by_rotation, 2.0 * threshold * threshold) >= kMinShareByRotation * num_inliers;
   // The block of the rotation bounds the information of both models.
   if (!IsFixed(rotation.H)) return std::nullopt;
-  const bool selects_rotation =
-      RotationExplains(squared_distances,
-                       SquaredFlows(arrays, rotation.j_from_i),
-                       std::hypot(noise, options.shared_error_px / focal_px));
-  if (selects_rotation) {
-    estimate.j_from_i = rotation.j_from_i;
-    // A baseline whose flow is below the shared error is absorbed by the rotation; on rendered
-    // gimbals by half.
-    const double shared_error = 0.5 * options.shared_error_px / focal_px;
-    estimate.covariance = 2.0 * noise * noise * rotation.H.inverse() +
-                          shared_error * shared_error * Eigen::Matrix3d::Identity();
-    estimate.translation_direction.setZero();
-    estimate.translation_covariance.setZero();
-    if (!estimate.covariance.allFinite()) return std::nullopt;
-    return estimate;
+  if (RotationExplains(squared_distances, flows_by_rotation, std::hypot(noise, shared_error))) {
+    SelectRotation(rotation, noise, shared_error, estimate);
+  } else {
+    SelectEpipolar(all, epipolar, noise, estimate);
   }
-  estimate.j_from_i = epipolar.model.j_from_i;
-  const Eigen::Matrix<double, 5, 5> covariance = noise * noise * epipolar.normal.H.inverse();
-  if (!covariance.allFinite()) return std::nullopt;
-  estimate.covariance = covariance.topLeftCorner<3, 3>();
-  estimate.translation_direction.setZero();
-  estimate.translation_covariance.setZero();
-  if (estimate.rotation_only) return estimate;
-  estimate.translation_direction = WithForwardSign(all, estimate.inliers, epipolar.model);
-  const Eigen::Matrix<double, 3, 2> basis = TangentBasis(epipolar.model.direction);
-  estimate.translation_covariance =
-      basis * covariance.bottomRightCorner<2, 2>() * basis.transpose();
+  if (!estimate.covariance.allFinite() || !estimate.translation_covariance.allFinite()) {
+    return std::nullopt;
+  }
   return estimate;
 }
 
 }  // namespace
 
 std::vector<RelativeRotationEstimate> EstimateRotationHypotheses(
-    const std::vector<BearingPair>& pairs,
+    const MatchedBearings& matches,
     const Rotation& predicted_j_from_i,
     double focal_px,
     const RelativeRotationOptions& options,
-    std::uint64_t seed,
-    std::span<const KeypointCovariances> covariances) {
+    std::uint64_t seed) {
   if (const auto problem = options.Problem())
     throw std::invalid_argument("RelativeRotationOptions: " + *problem);
-  CheckPairs(pairs);
-  if (!covariances.empty() && covariances.size() != pairs.size()) {
-    throw std::invalid_argument("EstimateRelativeRotation: not one covariance per pair");
-  }
-  if (static_cast<int>(pairs.size()) < options.min_inliers) return {};
+  CheckMatches(matches);
+  if (static_cast<int>(matches.pairs.size()) < options.min_inliers) return {};
 
-  const PairArrays all(pairs);
+  const PairArrays all(matches.pairs);
   std::vector<RelativeRotationEstimate> estimates;
   for (const Consensus& consensus :
        FindConsensus(all, predicted_j_from_i, focal_px, options, seed)) {
-    auto estimate = EstimateFrom(all, consensus, focal_px, options, covariances);
+    auto estimate = EstimateFrom(all, consensus, focal_px, options, matches.covariances);
     // Without an estimate from the best hypothesis the others are not used.
     if (!estimate) break;
     estimates.push_back(*std::move(estimate));
@@ -201,14 +222,12 @@ std::vector<RelativeRotationEstimate> EstimateRotationHypotheses(
 }
 
 std::optional<RelativeRotationEstimate> EstimateRelativeRotation(
-    const std::vector<BearingPair>& pairs,
+    const MatchedBearings& matches,
     const Rotation& predicted_j_from_i,
     double focal_px,
     const RelativeRotationOptions& options,
-    std::uint64_t seed,
-    std::span<const KeypointCovariances> covariances) {
-  auto estimates =
-      EstimateRotationHypotheses(pairs, predicted_j_from_i, focal_px, options, seed, covariances);
+    std::uint64_t seed) {
+  auto estimates = EstimateRotationHypotheses(matches, predicted_j_from_i, focal_px, options, seed);
   if (estimates.empty()) return std::nullopt;
   return std::move(estimates.front());
 }

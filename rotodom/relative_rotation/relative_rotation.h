@@ -12,6 +12,13 @@
 
 namespace rotslam {
 
+/// The matches of two views.
+struct MatchedBearings {
+  std::span<const BearingPair> pairs;  // with outliers
+  // One per pair, or none; used by the test of the baseline only.
+  std::span<const KeypointCovariances> covariances = {};
+};
+
 /// The relative rotation of two views estimated from their matches.
 struct RelativeRotationEstimate {
   Rotation j_from_i;
@@ -42,12 +49,11 @@ struct RelativeRotationEstimate {
 /// redescending loss. TestBaseline decides whether there is a baseline, and Torr's geometric
 /// information criterion selects the rotation; the two may disagree for baselines at the limit of
 /// detection. Matches with a MatchNoise are weighted by it throughout.
-/// @param pairs               matched bearings with outliers. A bearing that is not finite or an
-///                            invalid covariance throws std::invalid_argument.
+/// @param matches             a bearing that is not finite or an invalid covariance throws
+///                            std::invalid_argument.
 /// @param predicted_j_from_i  where to start; may be far off.
 /// @param focal_px            pixels per radian, for the thresholds.
 /// @param seed                equal seeds give equal results.
-/// @param covariances         one per pair, or none; used by the test of the baseline only.
 /// @return  nullopt when fewer than options.min_inliers matches agree or they do not determine the
 ///          rotation.
 /// Error:   medians of 80 scenes, 1,000 matches, 0.5 px at f = 700, 0 / 25 / 50 % outliers: 0.005 /
@@ -59,12 +65,11 @@ struct RelativeRotationEstimate {
 /// Source:  Torr, Geometric motion segmentation and model selection, 1998 (criterion); Muhle et
 /// al., The Probabilistic Normal Epipolar Constraint, CVPR 2022 (weights).
 std::optional<RelativeRotationEstimate> EstimateRelativeRotation(
-    const std::vector<BearingPair>& pairs,
+    const MatchedBearings& matches,
     const Rotation& predicted_j_from_i,
     double focal_px,
     const RelativeRotationOptions& options,
-    std::uint64_t seed,
-    std::span<const KeypointCovariances> covariances = {});
+    std::uint64_t seed);
 
 /// The same, followed by a second estimate where the matches allow another rotation almost as well,
 /// in most cases the second solution for a plane. Two views cannot decide between them; a third one
@@ -72,11 +77,10 @@ std::optional<RelativeRotationEstimate> EstimateRelativeRotation(
 /// @return  empty where EstimateRelativeRotation returns nullopt; ascending in `excess`, at most
 ///          two.
 std::vector<RelativeRotationEstimate> EstimateRotationHypotheses(
-    const std::vector<BearingPair>& pairs,
+    const MatchedBearings& matches,
     const Rotation& predicted_j_from_i,
     double focal_px,
     const RelativeRotationOptions& options,
-    std::uint64_t seed,
-    std::span<const KeypointCovariances> covariances = {});
+    std::uint64_t seed);
 
 }  // namespace rotslam

@@ -164,7 +164,8 @@ class ReadoutSearch {
       constexpr std::uint64_t kSeed = 1;
       const Rotation& predicted = pairs_[k].predicted_j_from_i;
       const std::vector<BearingPair> bearings = pairs_[k].BearingsFor({});
-      const auto estimate = EstimateRelativeRotation(bearings, predicted, focal_px, options, kSeed);
+      const auto estimate =
+          EstimateRelativeRotation({bearings}, predicted, focal_px, options, kSeed);
       auto& [rotation, epipolar] = global_.models[k];
       rotation = epipolar.j_from_i = estimate ? estimate->j_from_i : predicted;
       if (estimate) noises_px[k] = estimate->noise_px;
@@ -272,18 +273,16 @@ bool ReadoutEstimate::IsGlobal() const {
 }
 
 std::optional<ReadoutEstimate> EstimateReadout(const Camera& camera,
-                                               const std::map<FrameId, SeenPoints>& frames,
-                                               const ViewGraph& graph,
-                                               const RotationMap& cam_from_world,
+                                               const TrackedFrames& frames,
                                                const RelativeRotationOptions& options,
                                                int num_threads) {
   constexpr std::size_t kMinFrames = 4;
-  if (frames.size() < kMinFrames) return std::nullopt;
-  const double period_s = MedianPeriod(frames);
+  if (frames.points.size() < kMinFrames) return std::nullopt;
+  const double period_s = MedianPeriod(frames.points);
   const double longest_s = std::min(period_s, kLongestReadout);
   const double focal_px = camera.MeanFocal();
   std::vector<ViewPair> pairs =
-      SelectReadoutPairs(camera, frames, graph, cam_from_world, longest_s);
+      SelectReadoutPairs(camera, frames.points, frames.graph, frames.cam_from_world, longest_s);
   if (pairs.size() < kMinPairs) return std::nullopt;
   const ReadoutSearch search(std::move(pairs), longest_s, focal_px, options, num_threads);
   const auto best = search.Search();

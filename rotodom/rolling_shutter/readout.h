@@ -29,6 +29,14 @@ struct ReadoutEstimate {
   bool IsGlobal() const;
 };
 
+/// Frames tracked as if their shutter were global.
+struct TrackedFrames {
+  // With consecutive ids; the motion follows from a frame's neighbours in time.
+  const std::map<FrameId, SeenPoints>& points;
+  const ViewGraph& graph;             // edges between them
+  const RotationMap& cam_from_world;  // one per frame
+};
+
 /// Estimates the readout of a camera that rotates at varying rates, from orientations and tracks
 /// found as if its shutter were global.
 ///
@@ -41,10 +49,6 @@ struct ReadoutEstimate {
 /// the orientations and by the remaining flow, which is parallax and errors of the orientations.
 /// With orientations alone the readout of a hand-held camera comes out too short, because the scene
 /// moves against the rotation.
-/// @param frames          with consecutive ids; the motion follows from a frame's neighbours in
-///                        time.
-/// @param graph           edges between them.
-/// @param cam_from_world  one per frame.
 /// @return  nullopt where pairs are too few, rotate too evenly or do not agree on a readout below
 ///          50 ms and the time between two frames.
 /// Error:   0 to 5 % from 120 frames of rendered walks, gimbals and streets with readouts of 20 to
@@ -52,9 +56,7 @@ struct ReadoutEstimate {
 ///          cameras see docs/measurements.md.
 /// Cost:    1 to 3 s (300 to 600 pairs with 150 matches, one thread).
 std::optional<ReadoutEstimate> EstimateReadout(const Camera& camera,
-                                               const std::map<FrameId, SeenPoints>& frames,
-                                               const ViewGraph& graph,
-                                               const RotationMap& cam_from_world,
+                                               const TrackedFrames& frames,
                                                const RelativeRotationOptions& options,
                                                int num_threads);
 

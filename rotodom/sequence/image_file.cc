@@ -17,6 +17,7 @@
 #include <opencv2/imgcodecs.hpp>
 #include <opencv2/imgproc.hpp>
 
+#include "rotodom/sequence/crc32.h"
 #include "rotodom/sequence/heif_file.h"
 #include "rotodom/types/text_file.h"
 
@@ -69,22 +70,6 @@ bool IsCutOffJpeg(const Bytes& bytes) {
 
 // ---- PNG
 
-// CRC-32 of PNG, gzip and Ethernet, bit by bit through a table.
-std::uint32_t Crc32(const unsigned char* begin, const unsigned char* end) {
-  static const std::array<std::uint32_t, 256> table = [] {
-    std::array<std::uint32_t, 256> entries;
-    for (std::uint32_t byte = 0; byte < 256; ++byte) {
-      std::uint32_t value = byte;
-      for (int bit = 0; bit < 8; ++bit) value = (value >> 1) ^ ((value & 1) != 0 ? 0xedb88320 : 0);
-      entries[byte] = value;
-    }
-    return entries;
-  }();
-  std::uint32_t crc = 0xffffffff;
-  for (; begin != end; ++begin) crc = (crc >> 8) ^ table[(crc ^ *begin) & 0xff];
-  return ~crc;
-}
-
 // Bytes of the pixels that a header chunk (IHDR) of 13 bytes at `at` claims, at least.
 std::uint64_t ClaimedBytesOfPng(const Bytes& bytes, std::size_t at) {
   constexpr std::array<std::uint64_t, 7> kChannels = {1, 1, 3, 1, 2, 1, 4};  // by colour type
@@ -107,8 +92,9 @@ std::string DamageOfPng(const Bytes& bytes) {
     const std::size_t length = Number32At(bytes, at);
     if (length > bytes.size() - at - 12) break;
     const unsigned char* type = bytes.data() + at + 4;
+    const std::string_view chunk(reinterpret_cast<const char*>(type), 4 + length);
     const bool is_critical = (type[0] & 0x20) == 0;
-    if (is_critical && Crc32(type, type + 4 + length) != Number32At(bytes, at + 8 + length)) {
+    if (is_critical && Crc32(chunk) != Number32At(bytes, at + 8 + length)) {
       return "PNG data are damaged (checksum)";
     }
     if (std::equal(kHeader, kHeader + 4, type) && length >= 13 &&

@@ -335,14 +335,19 @@ bool LooksLikeDepth(const std::string& first, const std::string& second) {
   return !mentions(first, is_image) && (mentions(first, {"depth"}) || mentions(second, is_image));
 }
 
-// With times that are words still.
+// The columns of a list of images, with times that are words still.
+struct ListColumns {
+  const std::vector<TextLine>& lines;
+  const std::vector<std::string>& words;  // the times
+  const std::vector<std::string>& names;
+};
+
 void AddWithWords(const fs::path& list,
-                  const std::vector<TextLine>& lines,
-                  const std::vector<std::string>& words,
-                  const std::vector<std::string>& names,
+                  const ListColumns& columns,
                   const std::vector<fs::path>& folders,
                   const SequenceOptions& options,
                   Layout& layout) {
+  const auto& [lines, words, names] = columns;
   bool are_numbers = true;  // of frames, by which the images are called, too
   ListedFiles files(list, folders);
   for (std::size_t k = 0; k < lines.size(); ++k) {
@@ -446,7 +451,7 @@ void AddListedImages(const fs::path& list,
     std::swap(names, other_names);
     for (std::size_t k = 0; k < lines.size(); ++k) times[k] = CutIntoCells(lines[k].text)[2];
   }
-  AddWithWords(list, lines, times, names, folders, options, layout);
+  AddWithWords(list, {lines, times, names}, folders, options, layout);
 }
 
 }  // namespace rotslam

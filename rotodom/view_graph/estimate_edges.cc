@@ -12,9 +12,8 @@ namespace {
 
 // Covariances of the keypoints; zero for both where a keypoint is a new corner, empty where a view
 // has none.
-std::vector<KeypointCovariances> CovariancesOf(const Features& view_i,
-                                               const Features& view_j,
-                                               const std::vector<std::array<int, 2>>& keypoints) {
+std::vector<KeypointCovariances> CovariancesOf(const MatchedViews& views) {
+  const auto& [view_i, view_j, keypoints, noise] = views;
   const auto knows = [](const Features& view) {
     return std::ssize(view.covariances_px) == view.size();
   };
@@ -76,13 +75,11 @@ struct EdgeHypotheses {
   std::vector<double> excesses;
 };
 
-EdgeHypotheses HypothesesByMatches(const Features& view_i,
-                                   const Features& view_j,
-                                   const std::vector<std::array<int, 2>>& keypoints,
+EdgeHypotheses HypothesesByMatches(const MatchedViews& views,
                                    const Rotation& predicted_j_from_i,
                                    double focal_px,
-                                   const EdgeOptions& options,
-                                   std::span<const MatchNoise> noise = {}) {
+                                   const EdgeOptions& options) {
+  const auto& [view_i, view_j, keypoints, noise] = views;
   std::vector<BearingPair> pairs;
   pairs.reserve(keypoints.size());
   for (const auto& [of_i, of_j] : keypoints) {
@@ -96,14 +93,10 @@ EdgeHypotheses HypothesesByMatches(const Features& view_i,
   RelativeRotationOptions pair_options = options.relative_rotation;
   pair_options.shared_error_px =
       std::hypot(pair_options.shared_error_px, view_i.shared_error_px, view_j.shared_error_px);
+  const std::vector<KeypointCovariances> covariances = CovariancesOf(views);
   EdgeHypotheses hypotheses;
-  for (const RelativeRotationEstimate& estimate :
-       EstimateRotationHypotheses(pairs,
-                                  predicted_j_from_i,
-                                  focal_px,
-                                  pair_options,
-                                  seed,
-                                  CovariancesOf(view_i, view_j, keypoints))) {
+  for (const RelativeRotationEstimate& estimate : EstimateRotationHypotheses(
+           {pairs, covariances}, predicted_j_from_i, focal_px, pair_options, seed)) {
     hypotheses.connections.push_back(EdgeWithMatchesOf(estimate, i, j, keypoints));
     hypotheses.excesses.push_back(estimate.excess);
   }
@@ -124,15 +117,11 @@ PairHypotheses OrientationsBy(const EdgeHypotheses& hypotheses, const RotationMa
 
 }  // namespace
 
-std::optional<EdgeWithMatches> EstimateEdge(const Features& view_i,
-                                            const Features& view_j,
-                                            const std::vector<std::array<int, 2>>& keypoints,
+std::optional<EdgeWithMatches> EstimateEdge(const MatchedViews& views,
                                             const Rotation& predicted_j_from_i,
                                             double focal_px,
-                                            const EdgeOptions& options,
-                                            std::span<const MatchNoise> noise) {
-  EdgeHypotheses hypotheses =
-      HypothesesByMatches(view_i, view_j, keypoints, predicted_j_from_i, focal_px, options, noise);
+                                            const EdgeOptions& options) {
+  EdgeHypotheses hypotheses = HypothesesByMatches(views, predicted_j_from_i, focal_px, options);
   if (hypotheses.connections.empty()) return std::nullopt;
   return std::move(hypotheses.connections.front());
 }
@@ -160,9 +149,7 @@ std::vector<EdgeWithMatches> EstimateEdges(const Features& view,
   const Rotation& view_from_world = predicted_cam_from_world.at(view.frame);
   ParallelFor(static_cast<int>(others.size()), options.num_threads, [&](int k) {
     const Rotation& other_from_world = predicted_cam_from_world.at(others[k]->frame);
-    hypotheses[k] = HypothesesByMatches(*others[k],
-                                        view,
-                                        FindCommonPoints(*others[k], view),
+    hypotheses[k] = HypothesesByMatches({*others[k], view, FindCommonPoints(*others[k], view)},
                                         view_from_world * other_from_world.Inverse(),
                                         focal_px,
                                         options);

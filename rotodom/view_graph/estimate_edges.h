@@ -47,6 +47,14 @@ struct EdgeWithMatches {
   std::vector<int> outliers_j;  // keypoints of frame j whose match is an outlier
 };
 
+/// Two views and the keypoints that they have in common.
+struct MatchedViews {
+  const Features& view_i;
+  const Features& view_j;
+  const std::vector<std::array<int, 2>>& keypoints;  // of view_i and of view_j
+  std::span<const MatchNoise> noise = {};            // one for each of them; none: all are equal
+};
+
 /// Options for the estimation of edges.
 struct EdgeOptions {
   RelativeRotationOptions relative_rotation;
@@ -55,16 +63,11 @@ struct EdgeOptions {
 };
 
 /// Estimates the edge between two views from matched keypoints.
-/// @param keypoints  of view_i and of view_j.
-/// @param noise      one for each of them; none: all are equal.
 /// @return  nullopt when fewer than relative_rotation.min_inliers of them agree.
-std::optional<EdgeWithMatches> EstimateEdge(const Features& view_i,
-                                            const Features& view_j,
-                                            const std::vector<std::array<int, 2>>& keypoints,
+std::optional<EdgeWithMatches> EstimateEdge(const MatchedViews& views,
                                             const Rotation& predicted_j_from_i,
                                             double focal_px,
-                                            const EdgeOptions& options,
-                                            std::span<const MatchNoise> noise = {});
+                                            const EdgeOptions& options);
 
 /// Estimates the relative rotations between `view` and each of `others` from their common points.
 /// Where these allow two rotations, the one that agrees with the other pairs is selected

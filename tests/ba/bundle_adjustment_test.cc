@@ -501,7 +501,7 @@ TEST(RefineBundle, LeavesAGoodCalibrationToTheLastBit) {
 TEST(RefineBundle, GivesTheLensNoCreditForWhatTheCoarseRoundLeft) {
   const BaScene scene = MakeBaScene({.num_frames = 40, .num_points = 1500, .noise_px = 0.5});
   BundleOptions options;
-  options.bridge.enabled = false;
+  options.fixed_rotation.enabled = false;
   for (const int iterations : {1, 2, 3}) {
     options.coarse.max_iterations = iterations;
     const BundleResult result = RefineBundle(PerturbedProblem(scene, 0.1, 0.5), options);

@@ -8,7 +8,7 @@ namespace {
 
 void BM_EstimateRelativeRotation(benchmark::State& state) {
   RunOnScenes(state, [](const PairScene& scene) {
-    const auto estimate = EstimateRelativeRotation(scene.pairs, Rotation(), kPairFocalPx, {}, 1);
+    const auto estimate = EstimateRelativeRotation({scene.pairs}, Rotation(), kPairFocalPx, {}, 1);
     return estimate ? estimate->j_from_i : Rotation();
   });
 }
@@ -19,7 +19,7 @@ void BM_EstimateRelativeRotationWeighted(benchmark::State& state) {
   RunOnScenes(state, [](const PairScene& scene) {
     std::vector<BearingPair> pairs = scene.pairs;
     for (BearingPair& pair : pairs) pair.noise = MatchNoise{};
-    const auto estimate = EstimateRelativeRotation(pairs, Rotation(), kPairFocalPx, {}, 1);
+    const auto estimate = EstimateRelativeRotation({pairs}, Rotation(), kPairFocalPx, {}, 1);
     return estimate ? estimate->j_from_i : Rotation();
   });
 }

@@ -111,7 +111,7 @@ class InterruptedRun {
     options.features.max_features = 50;
     LoopOptions no_loops;
     no_loops.use_loops = false;
-    return LoopedOdometry(small, options, no_loops, nullptr, true, 1, 1);
+    return LoopedOdometry(small, {options, no_loops});
   }
 
   fs::path run_;

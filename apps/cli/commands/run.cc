@@ -1,41 +1,36 @@
-#include <chrono>
 #include <cstdio>
+#include <iterator>
 #include <memory>
 #include <stdexcept>
-#include <utility>
 
 #include "apps/cli/command.h"
 #include "apps/cli/commands/track_input.h"
-#include "apps/cli/input/open_input.h"
 #include "apps/cli/input/option_texts.h"
-#include "apps/cli/input/run_options.h"
-#include "apps/cli/run_directory/checkpoint.h"
+#include "apps/cli/run_directory/map_files.h"
+#include "apps/cli/run_directory/position_files.h"
 #include "apps/cli/run_directory/run_directory.h"
 #include "apps/cli/run_directory/run_report.h"
-#include "apps/cli/run_directory/unfinished.h"
+#include "apps/cli/run_directory/summary_parts.h"
 #include "apps/cli/terminal/describe.h"
-#include "apps/cli/terminal/interruption.h"
-#include "apps/cli/terminal/progress.h"
-#include "apps/cli/terminal/slam_progress.h"
 #include "apps/slam/build_map.h"
 #include "apps/slam/focal_length.h"
-#include "output/map/ply.h"
-#include "output/trajectory/trajectory.h"
 #include "rotodom/types/stopwatch.h"
 
 namespace rotslam {
 namespace {
 
-using Clock = std::chrono::steady_clock;
-
 struct RunFlags {
-  CommonFlags common;
-  InputFlags input;
-  CheckpointFlags checkpoint;
+  TrackFlags track;
   KrotFlags krot;
   bool ascii = false;
   bool use_report = true;
 };
+
+RunOptions RunOptionsOf(const RunFlags& flags) {
+  RunOptions options = ReadRunOptions(flags.track.common, flags.track.input);
+  flags.krot.Override(options.krot);
+  return options;
+}
 
 // The first frame of a component of the map, as segments.csv has it. Its first keyframes may lie
 // before that frame, in the pure-rotation segment at the end of the component before.
@@ -46,39 +41,75 @@ int FirstFrame(const std::vector<Segment>& segments, const MapComponent& part, i
   return part.keyframes.begin()->value;
 }
 
-int Run(const RunFlags& flags) {
-  const Clock::time_point start = Clock::now();
-  Interruption interruption;
-  Progress progress(flags.common);
-  RunOptions options = ReadRunOptions(flags.common, flags.input);
-  flags.krot.Override(options.krot);
+void WriteInterrupted(const TrackedInput& tracked, double orientations_s) {
+  RunSummary summary =
+      StartSummary("run", tracked.input, tracked.orientations, DescribeOptions(tracked.options));
+  summary.interrupted = true;
+  if (tracked.input.guess) summary.seconds.push_back({"focal_guess", tracked.guess_s});
+  summary.seconds.push_back({"orientations", orientations_s});
+  summary.seconds.push_back({"total", SecondsSince(tracked.start)});
+  WriteSummary(tracked.outputs.folder() / "summary.json", summary);
+  tracked.outputs.Publish();
+}
 
-  Input input = OpenInput(
-      flags.input, options.sequence, [&](const std::string& line) { progress.Say(line); });
-  auto vocabulary = OpenVocabulary(flags.input);
-  const std::filesystem::path directory = PrepareRunDirectory(flags.input.out);
-  RefineGuess(options, interruption, progress, input);
-  const double guess_s = SecondsSince(start);
-  Checkpoint checkpoint(directory,
-                        flags.checkpoint,
-                        IdentityOf("run", input, flags.input, options, flags.common.seed),
-                        progress);
-  if (input.guess) FreeFocalLength(options.ba.lens);
-  SlamProgress observer(options, interruption, progress);
-  const Orientations orientations =
-      TrackInput(options, std::move(vocabulary), true, observer, checkpoint, input);
-  const UnfinishedOutputs outputs(directory);
-  WriteOrientations(outputs.folder(), orientations);
-  const double orientations_s = SecondsSince(start) - guess_s;
+// Whether the camera only rotates, and with another lens than the one given.
+bool RotatesByLens(const MapResult& positions, const Input& input) {
+  return positions.rotates_throughout && positions.camera != input.camera;
+}
+
+RunSummary SummariseRun(const TrackedInput& tracked, const MapResult& positions) {
+  const Input& input = tracked.input;
+  RunSummary summary =
+      StartSummary("run", input, tracked.orientations, DescribeOptions(tracked.options));
+  AddPositions(positions, input.camera, summary);
+  if (RotatesByLens(positions, input)) {
+    summary.calibration = {{"source", "pure_rotation"},
+                           {"given_px", input.camera.MeanFocal()},
+                           {"refined_px", positions.camera.MeanFocal()}};
+  }
+  if (input.guess) {
+    summary.calibration = SummaryOf(*input.guess, positions.camera);
+    summary.seconds.push_back({"focal_guess", tracked.guess_s});
+  }
+  return summary;
+}
+
+// What the user must know of the result.
+void Warn(const MapResult& positions,
+          const std::vector<Segment>& segments,
+          const Input& input,
+          Progress& progress) {
+  for (int k = 1; k < std::ssize(positions.components); ++k) {
+    progress.Warn("the map from frame " +
+                  std::to_string(FirstFrame(segments, positions.components[k], k)) +
+                  " on shares no points with the part before: its scale is a guess, so that the "
+                  "scene stays as far away as it was, and distances there may be too long or too "
+                  "short. Film such changes of view more slowly, with part of the old view in the "
+                  "picture");
+  }
+  if (input.guess) progress.Warn(WarningOf(*input.guess, positions.camera));
+  if (!positions.rotates_throughout) return;
+  progress.Warn(
+      "the camera never leaves its place, it only rotates: the result has orientations, no "
+      "positions and no points. For a map, walk while you film" +
+      (RotatesByLens(positions, input)
+           ? ". With the calibration given the camera seems to move; without movement "
+             "this one fits better: " +
+                 DescribeRounded(positions.camera)
+           : std::string()));
+}
+
+int Run(const RunFlags& flags) {
+  TrackedInput tracked("run", flags.track, RunOptionsOf(flags), true);
+  const Input& input = tracked.input;
+  const Orientations& orientations = tracked.orientations;
+  const std::filesystem::path& folder = tracked.outputs.folder();
+  Progress& progress = tracked.progress;
+  if (input.guess) FreeFocalLength(tracked.options.ba.lens);
+  const double orientations_s = SecondsSince(tracked.start) - tracked.guess_s;
   const auto end_early = [&] {
-    RunSummary summary = StartSummary("run", input, orientations, DescribeOptions(options));
-    summary.interrupted = true;
-    if (input.guess) summary.seconds.push_back({"focal_guess", guess_s});
-    summary.seconds.push_back({"orientations", orientations_s});
-    summary.seconds.push_back({"total", SecondsSince(start)});
-    WriteSummary(outputs.folder() / "summary.json", summary);
-    outputs.Publish();
-    progress.Warn(DescribeInterrupted(directory, orientations, checkpoint));
+    WriteInterrupted(tracked, orientations_s);
+    progress.Warn(DescribeInterrupted(tracked.directory, orientations, tracked.checkpoint));
   };
   if (orientations.interrupted) {
     end_early();
@@ -86,65 +117,33 @@ int Run(const RunFlags& flags) {
   }
 
   const MapResult positions = [&] {
-    const EndAtInterruption end_at_interruption(interruption, end_early);
-    return BuildMap(orientations, options, input.frames.get(), observer);
+    const EndAtInterruption end_at_interruption(tracked.interruption, end_early);
+    return BuildMap(orientations, tracked.options, input.frames.get(), tracked.observer);
   }();
-  const double positions_s = SecondsSince(start) - orientations_s - guess_s;
-  WritePositions(outputs.folder(),
-                 orientations,
-                 positions,
-                 positions.camera,
-                 flags.ascii ? PlyForm::kAscii : PlyForm::kBinary);
-  WriteKnownRotationInput(outputs.folder(), orientations, positions, input.camera);
-  WriteMaps(outputs.folder(), input.sequence(), orientations, positions, options.rotodom.features);
-
-  RunSummary summary = StartSummary("run", input, orientations, DescribeOptions(options));
-  AddPositions(positions, input.camera, summary);
-  const bool rotates_by_lens = positions.rotates_throughout && positions.camera != input.camera;
-  if (rotates_by_lens) {
-    summary.calibration = {{"source", "pure_rotation"},
-                           {"given_px", input.camera.MeanFocal()},
-                           {"refined_px", positions.camera.MeanFocal()}};
-  }
-  if (input.guess) summary.calibration = SummaryOf(*input.guess, positions.camera);
-  if (input.guess) summary.seconds.push_back({"focal_guess", guess_s});
+  const double positions_s = SecondsSince(tracked.start) - orientations_s - tracked.guess_s;
+  WritePositions(folder, orientations, positions, flags.ascii ? PlyForm::kAscii : PlyForm::kBinary);
+  WriteKnownRotationInput(folder, orientations, positions, input.camera);
+  WriteMaps(folder, input.sequence(), orientations, positions, tracked.options.rotodom.features);
+  RunSummary summary = SummariseRun(tracked, positions);
   summary.seconds.push_back({"orientations", orientations_s});
   summary.seconds.push_back({"positions", positions_s});
-  summary.seconds.push_back({"total", SecondsSince(start)});
-  WriteSummary(outputs.folder() / "summary.json", summary);
-  outputs.Publish();
+  summary.seconds.push_back({"total", SecondsSince(tracked.start)});
+  WriteSummary(folder / "summary.json", summary);
+  tracked.outputs.Publish();
 
-  for (int k = 1; k < std::ssize(positions.components); ++k) {
-    progress.Warn("the map from frame " +
-                  std::to_string(FirstFrame(*summary.segments, positions.components[k], k)) +
-                  " on shares no points with the part before: its scale is a guess, so that the "
-                  "scene stays as far away as it was, and distances there may be too long or too "
-                  "short. Film such changes of view more slowly, with part of the old view in the "
-                  "picture");
-  }
-  if (input.guess) progress.Warn(WarningOf(*input.guess, positions.camera));
-  if (positions.rotates_throughout) {
-    progress.Warn(
-        "the camera never leaves its place, it only rotates: the result has orientations, no "
-        "positions and no points. For a map, walk while you film" +
-        (rotates_by_lens
-             ? ". With the calibration given the camera seems to move; without movement "
-               "this one fits better: " +
-                   DescribeRounded(positions.camera)
-             : std::string()));
-  }
-  if (flags.use_report) WriteReportOfRun(directory, flags.common, progress);
-  checkpoint.Remove();
-  progress.Say("wrote " + directory.string() +
+  Warn(positions, *summary.segments, input, progress);
+  if (flags.use_report) WriteReportOfRun(tracked.directory, flags.track.common, progress);
+  tracked.checkpoint.Remove();
+  progress.Say("wrote " + tracked.directory.string() +
                ": trajectory_tum.txt, trajectory_kitti.txt, keyframes_tum.txt, "
                "rotations_tum.txt, rotations.csv, loops.csv, cloud.ply, cameras.ply, segments.csv, "
                "view_graph.g2o, "
                "known_rotation.txt, map.bin, map_all_frames.bin, summary.json" +
                (flags.use_report ? ", report.html" : ""));
   if (positions.failure.empty()) {
-    return interruption.IsRequested() ? Interruption::kExitCode : 0;
+    return tracked.interruption.IsRequested() ? Interruption::kExitCode : 0;
   }
-  throw std::runtime_error("orientations are in " + directory.string() +
+  throw std::runtime_error("orientations are in " + tracked.directory.string() +
                            ", positions are not: " + positions.failure);
 }
 
@@ -153,8 +152,7 @@ void AddPrintConfigFlag(CLI::App& command, const RunFlags& flags) {
   command.add_flag_callback(
       "--print-config",
       [&flags] {
-        RunOptions options = ReadRunOptions(flags.common, flags.input);
-        flags.krot.Override(options.krot);
+        RunOptions options = RunOptionsOf(flags);
         std::fputs(OptionsAsYaml(ListOptions(options)).c_str(), stdout);
         throw CLI::Success();
       },
@@ -167,17 +165,17 @@ void AddRunCommand(CLI::App& app, Action& action) {
   const auto flags = std::make_shared<RunFlags>();
   CLI::App* command = app.add_subcommand(
       "run", "The whole chain: a sequence goes in, a trajectory and a point cloud come out");
-  AddInputFlags(*command, flags->input);
-  AddCheckpointFlags(*command, flags->checkpoint);
+  AddInputFlags(*command, flags->track.input);
+  AddCheckpointFlags(*command, flags->track.checkpoint);
   AddKrotFlags(*command, flags->krot);
   command->add_option(
       "--rotations",
-      flags->input.rotations,
+      flags->track.input.rotations,
       "Orientations from elsewhere (a gimbal, an IMU, another SLAM), camera->world: "
       "a TUM file or a rotations.csv; the images then give tracks and positions");
   command->add_flag("--ascii", flags->ascii, "Write the PLY files as text");
   AddReportFlag(*command, flags->use_report);
-  AddCommonFlags(*command, flags->common);
+  AddCommonFlags(*command, flags->track.common);
   // The last one: what stands in front of it is read first.
   AddPrintConfigFlag(*command, *flags);
   command->footer("Example: rotslam run kitti/sequences/00 --out runs/kitti00");

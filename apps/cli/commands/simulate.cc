@@ -88,14 +88,81 @@ int Simulate(const SimulateFlags& flags) {
   return 0;
 }
 
+void AddPathFlags(CLI::App& command, SimulateFlags& flags) {
+  SimulationOptions& simulation = flags.simulation;
+  command.add_option(
+      "--frames", simulation.frames, "Frames of the whole path; 0: as many as it brings");
+  command.add_option("--first", simulation.first, "First frame of the path to render");
+  command.add_option("--last", simulation.last, "Last frame of the path to render");
+  command.add_option(
+      "--fps", simulation.fps, "Frames a second; 0: 30 in the room, 10 in the street");
+  command
+      .add_option("--speed-scale",
+                  simulation.speed_scale,
+                  "The same way in fewer (> 1) or more (< 1) frames")
+      ->capture_default_str();
+  command.add_option("--turn-axis", flags.turn_axis, "gimbal: turn about yaw, pitch or roll")
+      ->check(CLI::IsMember({"yaw", "pitch", "roll"}))
+      ->capture_default_str();
+  command.add_option("--turn-deg", simulation.turn_deg, "gimbal: angle turned in place")
+      ->capture_default_str();
+  command.add_option("--lever-arm",
+                     simulation.lever_arm_m,
+                     "gimbal: metres from the axis of the turn to the camera's centre");
+  command.add_option(
+      "--poses", simulation.poses, "street: KITTI pose file to drive along (12 numbers a line)");
+}
+
+void AddCameraFlags(CLI::App& command, SimulateFlags& flags) {
+  auto* camera = command.add_option(
+      "--camera",
+      flags.camera,
+      "Camera file (any form `run` reads; FILE:NAME of several), with distortion");
+  command.add_option("--width", flags.width, "Image width in pixels")
+      ->check(CLI::Range(16, 20000))
+      ->capture_default_str();
+  command.add_option("--height", flags.height, "Image height in pixels")
+      ->check(CLI::Range(16, 20000))
+      ->capture_default_str();
+  command.add_option("--hfov-deg", flags.hfov_deg, "Horizontal field of view of a pinhole camera")
+      ->excludes(camera)
+      ->capture_default_str();
+  command.add_option("--fx", flags.fx, "Focal length in pixels, instead of --hfov-deg")
+      ->check(AboveZero())
+      ->excludes(camera);
+  command.add_option("--fy", flags.fy, "Vertical focal length; default: fx")
+      ->check(AboveZero())
+      ->excludes(camera);
+  command.add_option("--cx", flags.cx, "Principal point; default: the middle")->excludes(camera);
+  command.add_option("--cy", flags.cy, "Principal point; default: the middle")->excludes(camera);
+  command
+      .add_option("--readout",
+                  flags.readout_s,
+                  "Rolling shutter: seconds from the first row to the last; 0: a global one")
+      ->excludes(camera);
+}
+
+void AddRenderFlags(CLI::App& command, SimulationOptions& simulation) {
+  RenderOptions& render = simulation.render;
+  command.add_option("--noise", render.noise_grey, "Sensor noise, sigma in grey levels")
+      ->capture_default_str();
+  command.add_option("--exposure", render.exposure_variation, "Gain wanders within 1 +- this")
+      ->capture_default_str();
+  command
+      .add_option("--blur", render.blur_subframes, "Sub-frames averaged for motion blur; 1: sharp")
+      ->capture_default_str();
+  command.add_option("--shutter", render.shutter_s, "Seconds the shutter is open, with --blur")
+      ->capture_default_str();
+  command.add_option("--distractors", simulation.distractors, "Boxes moving through the scene");
+  command.add_flag("--color", render.color, "Colour instead of grey pictures");
+}
+
 }  // namespace
 
 void AddSimulateCommand(CLI::App& app, Action& action) {
   auto* command = app.add_subcommand(
       "simulate", "Render a sequence with exact ground truth: a room or a street of our own");
   const auto flags = std::make_shared<SimulateFlags>();
-  SimulationOptions& simulation = flags->simulation;
-  RenderOptions& render = simulation.render;
   command
       ->add_option("kind",
                    flags->kind,
@@ -106,64 +173,9 @@ void AddSimulateCommand(CLI::App& app, Action& action) {
   command->add_option("--layout", flags->layout, "Layout of the files: tum or euroc")
       ->check(CLI::IsMember({"tum", "euroc"}))
       ->capture_default_str();
-  command->add_option(
-      "--frames", simulation.frames, "Frames of the whole path; 0: as many as it brings");
-  command->add_option("--first", simulation.first, "First frame of the path to render");
-  command->add_option("--last", simulation.last, "Last frame of the path to render");
-  command->add_option(
-      "--fps", simulation.fps, "Frames a second; 0: 30 in the room, 10 in the street");
-  command
-      ->add_option("--speed-scale",
-                   simulation.speed_scale,
-                   "The same way in fewer (> 1) or more (< 1) frames")
-      ->capture_default_str();
-  command->add_option("--turn-axis", flags->turn_axis, "gimbal: turn about yaw, pitch or roll")
-      ->check(CLI::IsMember({"yaw", "pitch", "roll"}))
-      ->capture_default_str();
-  command->add_option("--turn-deg", simulation.turn_deg, "gimbal: angle turned in place")
-      ->capture_default_str();
-  command->add_option("--lever-arm",
-                      simulation.lever_arm_m,
-                      "gimbal: metres from the axis of the turn to the camera's centre");
-  command->add_option(
-      "--poses", simulation.poses, "street: KITTI pose file to drive along (12 numbers a line)");
-  auto* camera = command->add_option(
-      "--camera",
-      flags->camera,
-      "Camera file (any form `run` reads; FILE:NAME of several), with distortion");
-  command->add_option("--width", flags->width, "Image width in pixels")
-      ->check(CLI::Range(16, 20000))
-      ->capture_default_str();
-  command->add_option("--height", flags->height, "Image height in pixels")
-      ->check(CLI::Range(16, 20000))
-      ->capture_default_str();
-  command->add_option("--hfov-deg", flags->hfov_deg, "Horizontal field of view of a pinhole camera")
-      ->excludes(camera)
-      ->capture_default_str();
-  command->add_option("--fx", flags->fx, "Focal length in pixels, instead of --hfov-deg")
-      ->check(AboveZero())
-      ->excludes(camera);
-  command->add_option("--fy", flags->fy, "Vertical focal length; default: fx")
-      ->check(AboveZero())
-      ->excludes(camera);
-  command->add_option("--cx", flags->cx, "Principal point; default: the middle")->excludes(camera);
-  command->add_option("--cy", flags->cy, "Principal point; default: the middle")->excludes(camera);
-  command
-      ->add_option("--readout",
-                   flags->readout_s,
-                   "Rolling shutter: seconds from the first row to the last; 0: a global one")
-      ->excludes(camera);
-  command->add_option("--noise", render.noise_grey, "Sensor noise, sigma in grey levels")
-      ->capture_default_str();
-  command->add_option("--exposure", render.exposure_variation, "Gain wanders within 1 +- this")
-      ->capture_default_str();
-  command
-      ->add_option("--blur", render.blur_subframes, "Sub-frames averaged for motion blur; 1: sharp")
-      ->capture_default_str();
-  command->add_option("--shutter", render.shutter_s, "Seconds the shutter is open, with --blur")
-      ->capture_default_str();
-  command->add_option("--distractors", simulation.distractors, "Boxes moving through the scene");
-  command->add_flag("--color", render.color, "Colour instead of grey pictures");
+  AddPathFlags(*command, *flags);
+  AddCameraFlags(*command, *flags);
+  AddRenderFlags(*command, flags->simulation);
   AddCommonFlags(*command, flags->common);
   command->footer("Example: rotslam simulate gimbal --out sequences/gimbal");
   command->callback([flags, &action] { action = [flags] { return Simulate(*flags); }; });

@@ -15,6 +15,7 @@
 #include "apps/cli/command.h"
 #include "apps/cli/input/run_options.h"
 #include "apps/cli/run_directory/run_directory.h"
+#include "apps/cli/run_directory/summary_parts.h"
 #include "apps/cli/terminal/describe.h"
 #include "apps/cli/terminal/progress.h"
 #include "apps/slam/map/refinement.h"
@@ -213,7 +214,10 @@ int Solve(const SolveFlags& flags) {
 
   progress.StartStage("bundle adjustment", -1);
   const RefinedComponents refined =
-      RefineComponents(input.cam_from_world, krot, input.tracks, {}, input.camera, options.ba);
+      RefineComponents({input.cam_from_world, krot.center_in_world, input.tracks},
+                       krot.component,
+                       input.camera,
+                       options.ba);
   const std::vector<std::size_t> order = BySize(refined);
   if (order.empty()) {
     throw std::runtime_error(flags.input + ": bundle adjustment found no usable map");

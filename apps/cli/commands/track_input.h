@@ -1,10 +1,14 @@
 #pragma once
 
+#include <chrono>
+#include <filesystem>
 #include <memory>
+#include <string>
 
 #include "apps/cli/input/input.h"
 #include "apps/cli/input/run_options.h"
 #include "apps/cli/run_directory/checkpoint.h"
+#include "apps/cli/run_directory/unfinished.h"
 #include "apps/cli/terminal/interruption.h"
 #include "apps/cli/terminal/progress.h"
 #include "apps/cli/terminal/slam_progress.h"
@@ -12,21 +16,37 @@
 
 namespace rotslam {
 
-/// Finds the focal length of an input whose camera is a guess; of another one nothing. A request to
-/// stop ends the program meanwhile: nothing is lost yet.
-void RefineGuess(const RunOptions& options,
-                 Interruption& interruption,
-                 Progress& progress,
-                 Input& input);
+/// The flags that `run` and `rotations` share.
+struct TrackFlags {
+  CommonFlags common;
+  InputFlags input;
+  CheckpointFlags checkpoint;
+};
 
-/// The first stage of `run` and `rotations`. The input's camera gets the readout that the images
-/// tell. Throws what FindOrientations throws; InterruptedError where a request to stop came before
-/// there was anything to write.
-Orientations TrackInput(const RunOptions& options,
-                        std::shared_ptr<const Vocabulary> vocabulary,
-                        bool keep_features,
-                        SlamProgress& observer,
-                        Checkpoint& checkpoint,
-                        Input& input);
+/// What `run` and `rotations` begin with: opens the input, finds the focal length where the camera
+/// is a guess, and writes the orientations of all frames to the folder of unfinished outputs.
+struct TrackedInput {
+  /// @param keep_features  for a map.
+  /// Throws what FindOrientations throws; InterruptedError where a request to stop came before
+  /// there was anything to write.
+  TrackedInput(const std::string& command,
+               const TrackFlags& flags,
+               RunOptions run_options,
+               bool keep_features);
+
+  const std::chrono::steady_clock::time_point start = std::chrono::steady_clock::now();
+  Interruption interruption;
+  Progress progress;
+  RunOptions options;
+  // Its camera gets the focal length and the readout that the images tell.
+  Input input;
+  std::shared_ptr<const Vocabulary> vocabulary;
+  std::filesystem::path directory;
+  double guess_s = 0.0;  // until the focal length was found
+  Checkpoint checkpoint;
+  SlamProgress observer;
+  Orientations orientations;
+  UnfinishedOutputs outputs;
+};
 
 }  // namespace rotslam

@@ -92,8 +92,7 @@ CenterMap CentersAround(FrameId one,
     }
   }
   for (const auto& [frame, pose] : ResectFrames(starts,
-                                                map.point_in_world,
-                                                sources.tracks,
+                                                {map.point_in_world, sources.tracks},
                                                 sources.camera,
                                                 sources.resection,
                                                 sources.num_threads)) {

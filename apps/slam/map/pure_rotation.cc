@@ -108,7 +108,7 @@ BaselineVotes TestPairs(const std::vector<RelativeRotation>& edges,
   BaselineVotes votes;
   for (const RelativeRotation& edge : sample) {
     const auto estimate = EstimateRelativeRotation(
-        PairsOf(edge, observations), edge.j_from_i, focal_px, options, kSeed);
+        {PairsOf(edge, observations)}, edge.j_from_i, focal_px, options, kSeed);
     if (!estimate) continue;
     ++votes.tested;
     votes.without += estimate->rotation_only ? 1 : 0;

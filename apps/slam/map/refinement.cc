@@ -14,11 +14,12 @@
 namespace rotslam {
 namespace {
 
-// Keyframes of each component of the known-rotation solution, by first keyframe.
-std::vector<MapComponent> ComponentsOf(const KrotSolution& krot) {
+// Keyframes of each component that have a centre, by first keyframe.
+std::vector<MapComponent> ComponentsOf(const std::map<FrameId, int>& component_of,
+                                       const CenterMap& center_in_world) {
   std::map<int, MapComponent> by_number;
-  for (const auto& [frame, number] : krot.component) {
-    if (krot.center_in_world.contains(frame)) by_number[number].keyframes.insert(frame);
+  for (const auto& [frame, number] : component_of) {
+    if (center_in_world.contains(frame)) by_number[number].keyframes.insert(frame);
   }
   std::vector<MapComponent> components;
   for (auto& [number, component] : by_number) {
@@ -58,25 +59,22 @@ BundleOptions WithFixedLens(BundleOptions options) {
 }
 
 BundleResult RefineComponent(const MapComponent& component,
-                             const RotationMap& cam_from_world,
-                             const CenterMap& center_in_world,
-                             const std::vector<Track>& tracks,
-                             const std::vector<PureRotationSegment>& segments,
+                             const RefinementStart& start,
                              const Camera& camera,
                              const BundleOptions& options,
                              const TrackCompletion& complete) {
   BundleProblem problem;
   problem.camera = camera;
   for (const FrameId frame : component.keyframes) {
-    problem.start.cam_from_world[frame] = cam_from_world.at(frame);
-    problem.start.center_in_world[frame] = center_in_world.at(frame);
+    problem.start.cam_from_world[frame] = start.cam_from_world.at(frame);
+    problem.start.center_in_world[frame] = start.center_in_world.at(frame);
   }
-  for (const PureRotationSegment& segment : segments) {
+  for (const PureRotationSegment& segment : start.segments) {
     if (component.keyframes.contains(segment.first) && component.keyframes.contains(segment.last)) {
       problem.shared_center[segment.last] = segment.first;
     }
   }
-  problem.start.tracks = RestrictTracks(tracks, component.keyframes, 2);
+  problem.start.tracks = RestrictTracks(start.tracks, component.keyframes, 2);
   return RefineBundle(problem, options, complete);
 }
 
@@ -90,35 +88,31 @@ std::vector<Track> WithBearingsOf(const Camera& camera, std::vector<Track> track
   return tracks;
 }
 
-RefinedComponents RefineComponents(const RotationMap& cam_from_world,
-                                   const KrotSolution& krot,
-                                   const std::vector<Track>& tracks,
-                                   const std::vector<PureRotationSegment>& segments,
+RefinedComponents RefineComponents(const RefinementStart& start,
+                                   const std::map<FrameId, int>& component,
                                    const Camera& camera,
                                    const BundleOptions& options,
                                    const TrackCompletion& complete) {
   RefinedComponents refined;
   refined.camera = camera;
-  refined.components = ComponentsOf(krot);
+  refined.components = ComponentsOf(component, start.center_in_world);
   refined.bundles.resize(refined.components.size());
   if (refined.components.empty()) return refined;
   const auto refine =
       [&](std::size_t k, const std::vector<Track>& seen, const BundleOptions& bundle_options) {
-        refined.bundles[k] = RefineComponent(refined.components[k],
-                                             cam_from_world,
-                                             krot.center_in_world,
-                                             seen,
-                                             segments,
-                                             refined.camera,
-                                             bundle_options,
-                                             complete);
+        refined.bundles[k] =
+            RefineComponent(refined.components[k],
+                            {start.cam_from_world, start.center_in_world, seen, start.segments},
+                            refined.camera,
+                            bundle_options,
+                            complete);
       };
-  const std::size_t first = LargestComponent(refined.components, tracks);
-  refine(first, tracks, options);
+  const std::size_t first = LargestComponent(refined.components, start.tracks);
+  refine(first, start.tracks, options);
   refined.camera = refined.bundles[first].camera;
   if (refined.components.size() == 1) return refined;
   const BundleOptions same_lens = WithFixedLens(options);
-  const std::vector<Track> seen = WithBearingsOf(refined.camera, tracks);
+  const std::vector<Track> seen = WithBearingsOf(refined.camera, start.tracks);
   for (std::size_t k = 0; k < refined.components.size(); ++k) {
     if (k != first) refine(k, seen, same_lens);
   }

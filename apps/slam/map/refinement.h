@@ -1,6 +1,8 @@
 #pragma once
 
+#include <map>
 #include <set>
+#include <span>
 #include <string>
 #include <vector>
 
@@ -23,12 +25,18 @@ struct RefinedComponents {
   Camera camera;                         // as the component with the most observations refined it
 };
 
+/// Where the bundle adjustment of components starts.
+struct RefinementStart {
+  const RotationMap& cam_from_world;
+  const CenterMap& center_in_world;
+  const std::vector<Track>& tracks;  // outliers among their observations are classified anew
+  // Where both ends of one are keyframes of a component they share a centre.
+  std::span<const PureRotationSegment> segments = {};
+};
+
 /// Bundle adjustment of one component, in its own scale, from poses of all its keyframes.
 BundleResult RefineComponent(const MapComponent& component,
-                             const RotationMap& cam_from_world,
-                             const CenterMap& center_in_world,
-                             const std::vector<Track>& tracks,
-                             const std::vector<PureRotationSegment>& segments,
+                             const RefinementStart& start,
                              const Camera& camera,
                              const BundleOptions& options,
                              const TrackCompletion& complete);
@@ -38,16 +46,12 @@ BundleOptions WithFixedLens(BundleOptions options);
 
 /// Bundle adjustment of every component from its known-rotation positions. The component with the
 /// most observations refines the lens, as far as the options let it; the others use that lens.
-/// @param cam_from_world  of every view that the solution has placed.
-/// @param tracks          the input of the known-rotation problem; its outliers are classified
-///                        anew.
-/// @param segments        pure-rotation segments: where both ends are keyframes of a component they
-///                        share a centre.
-/// @param complete        as RefineBundle takes it.
-RefinedComponents RefineComponents(const RotationMap& cam_from_world,
-                                   const KrotSolution& krot,
-                                   const std::vector<Track>& tracks,
-                                   const std::vector<PureRotationSegment>& segments,
+/// @param start      the rotations and tracks of the known-rotation problem, the centres of its
+///                   solution.
+/// @param component  as in KrotSolution.
+/// @param complete   as RefineBundle takes it.
+RefinedComponents RefineComponents(const RefinementStart& start,
+                                   const std::map<FrameId, int>& component,
                                    const Camera& camera,
                                    const BundleOptions& options,
                                    const TrackCompletion& complete = nullptr);

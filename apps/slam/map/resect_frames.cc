@@ -21,8 +21,7 @@ Eigen::Vector3d InterpolatedCenter(const CenterMap& centers,
 }
 
 std::map<FrameId, ResectedPose> ResectFrames(const std::map<FrameId, ResectionStart>& starts,
-                                             const PointMap& points,
-                                             const std::vector<Track>& tracks,
+                                             const SeenMap& map,
                                              const Camera& camera,
                                              const ResectionOptions& options,
                                              int num_threads) {
@@ -38,9 +37,9 @@ std::map<FrameId, ResectedPose> ResectFrames(const std::map<FrameId, ResectionSt
     place[frame] = static_cast<int>(frames.size());
     frames.push_back({frame, &start, {}, std::nullopt});
   }
-  for (const Track& track : tracks) {
-    const auto point = points.find(track.id);
-    if (point == points.end()) continue;
+  for (const Track& track : map.tracks) {
+    const auto point = map.points.find(track.id);
+    if (point == map.points.end()) continue;
     for (const Observation& observation : track.observations) {
       const auto seen_from = place.find(observation.frame);
       if (seen_from == place.end()) continue;

@@ -17,11 +17,15 @@ Eigen::Vector3d InterpolatedCenter(const CenterMap& centers,
                                    const std::vector<double>& timestamps_s,
                                    FrameId frame);
 
+/// The points of a map and the tracks that see them.
+struct SeenMap {
+  const PointMap& points;
+  const std::vector<Track>& tracks;  // of the frames; must include the tracks of the points
+};
+
 /// Resects frames against the points of a map. Frames for which ResectFrame fails are left out.
-/// @param tracks  of the frames; must include the tracks of the points.
 std::map<FrameId, ResectedPose> ResectFrames(const std::map<FrameId, ResectionStart>& starts,
-                                             const PointMap& points,
-                                             const std::vector<Track>& tracks,
+                                             const SeenMap& map,
                                              const Camera& camera,
                                              const ResectionOptions& options,
                                              int num_threads);

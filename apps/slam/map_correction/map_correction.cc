@@ -116,30 +116,29 @@ std::vector<Lookalike> PairsAcross(const std::vector<const Reconstruction*>& map
 }  // namespace
 
 std::set<FrameId> CorrectMaps(MapCorrectionSources sources,
-                              const Camera& calibrated,
-                              std::vector<Track> tracks,
                               const RelocalisationOptions& options,
-                              std::uint64_t seed,
                               const BundleOptions& bundle_options,
                               RefinedComponents& refined) {
   // Further frames are found displaced once others have been corrected. The number of passes bounds
   // the time.
   constexpr int kMaxPasses = 3;
+  const RelocalisedRefinement refinement{
+      sources.calibrated, bundle_options, sources.complete, sources.segments};
   PlaceMatches places(sources.places, refined.camera);
   const auto relocalise = [&]() {
     const std::vector<Reconstruction> lost =
-        MapsOfUnregistered(tracks, sources.unregistered, sources.places, refined);
+        MapsOfUnregistered(sources.tracks, sources.unregistered, sources.places, refined);
     std::vector<const Reconstruction*> maps;
     for (const BundleResult& bundle : refined.bundles) maps.push_back(&bundle.reconstruction);
     for (const Reconstruction& map : lost) maps.push_back(&map);
-    return Relocalise(maps,
-                      tracks,
-                      places,
-                      PairsAcross(maps, sources.places, sources.lookalikes),
-                      refined.camera,
+    return Relocalise({maps,
+                       sources.tracks,
+                       PairsAcross(maps, sources.places, sources.lookalikes),
+                       refined.camera},
                       options,
-                      seed,
-                      bundle_options.num_threads);
+                      sources.seed,
+                      bundle_options.num_threads,
+                      places);
   };
   std::set<FrameId> moved;
   for (int pass = 0; pass < kMaxPasses; ++pass) {
@@ -150,8 +149,7 @@ std::set<FrameId> CorrectMaps(MapCorrectionSources sources,
       has_more |= CompareFramesToCheck(map, sources);
     }
     if (has_more) changed = relocalise();
-    const std::set<FrameId> now = RefineRelocalised(
-        changed, sources.segments, calibrated, bundle_options, sources.complete, tracks, refined);
+    const std::set<FrameId> now = RefineRelocalised(changed, refinement, sources.tracks, refined);
     if (now.empty()) break;
     moved.insert(now.begin(), now.end());
   }

@@ -21,29 +21,27 @@ using FrameDescription = std::function<std::map<FrameId, Features>(
 
 /// Evidence that frames are in a wrong place, and what the correction needs beside the maps.
 struct MapCorrectionSources {
+  Camera calibrated;          // as it was given
+  std::vector<Track> tracks;  // as RefineComponents took them
   std::vector<Lookalike> lookalikes;
   std::map<FrameId, Features> places;  // described corners of those frames and some around them
   std::set<FrameId> unregistered;      // frames whose tracks do not place them in a map
   FrameDescription describe;           // for frames not in `places`; may be null
   TrackCompletion complete;            // as RefineBundle takes it
   std::vector<PureRotationSegment> segments;  // as RefineComponents takes them
+  std::uint64_t seed = 1;
 };
 
 /// Moves keyframes that Relocalise finds in a wrong place, and adjusts the maps from there, as long
 /// as the maps explain more observations that way. Neighbours of a moved keyframe are tested as
 /// well, since the same wrong matches may have misled them. Places that no map holds, and maps that
 /// are not connected to the others, are found in the same way.
-/// @param calibrated  the camera as it was given.
-/// @param tracks      as RefineComponents took them.
-/// @param refined     the maps; those that are corrected are replaced.
+/// @param refined  the maps; those that are corrected are replaced.
 /// @return  the keyframes that were moved; the same at any number of threads.
 /// Error:   see docs/measurements.md.
 /// Cost:    Relocalise's, and a bundle adjustment for each of up to three passes.
 std::set<FrameId> CorrectMaps(MapCorrectionSources sources,
-                              const Camera& calibrated,
-                              std::vector<Track> tracks,
                               const RelocalisationOptions& options,
-                              std::uint64_t seed,
                               const BundleOptions& bundle_options,
                               RefinedComponents& refined);
 

@@ -86,13 +86,11 @@ void AddEffort(const BundleSummary& other, BundleSummary& summary) {
 }  // namespace
 
 std::set<FrameId> RefineRelocalised(const std::vector<RelocalisedMap>& maps,
-                                    const std::vector<PureRotationSegment>& segments,
-                                    const Camera& calibrated,
-                                    BundleOptions options,
-                                    const TrackCompletion& complete,
+                                    const RelocalisedRefinement& refinement,
                                     std::vector<Track>& tracks,
                                     RefinedComponents& refined) {
-  options.bridge.enabled = false;
+  BundleOptions options = refinement.options;
+  options.fixed_rotation.enabled = false;
   std::set<FrameId> moved;
   std::set<int> replaced;
   for (const RelocalisedMap& map : maps) {
@@ -104,16 +102,14 @@ std::set<FrameId> RefineRelocalised(const std::vector<RelocalisedMap>& maps,
     // Wrong places bias the lens, so it starts from the calibration. With several maps it is kept
     // fixed, since all have the same lens.
     const bool is_all = parts.size() == refined.components.size();
-    const Camera& camera = is_all ? calibrated : refined.camera;
+    const Camera& camera = is_all ? refinement.calibrated : refined.camera;
     std::vector<Track> seen = WithBearingsOf(camera, WithObservations(map.observations, tracks));
-    BundleResult bundle = RefineComponent(component,
-                                          map.cam_from_world,
-                                          map.center_in_world,
-                                          seen,
-                                          segments,
-                                          camera,
-                                          is_all ? options : WithFixedLens(options),
-                                          complete);
+    BundleResult bundle =
+        RefineComponent(component,
+                        {map.cam_from_world, map.center_in_world, seen, refinement.segments},
+                        camera,
+                        is_all ? options : WithFixedLens(options),
+                        refinement.complete);
     BundleSummary& before = refined.bundles[LargestOf(parts, refined)].summary;
     if (!IsBetter(map, bundle, parts, refined)) {
       AddEffort(bundle.summary, before);

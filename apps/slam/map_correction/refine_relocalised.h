@@ -8,20 +8,24 @@
 
 namespace rotslam {
 
+/// What the bundle adjustments of relocalised maps have in common.
+struct RelocalisedRefinement {
+  Camera calibrated;  // as it was given
+  BundleOptions options = {};
+  TrackCompletion complete = nullptr;                  // as RefineBundle takes it
+  std::span<const PureRotationSegment> segments = {};  // as RefineComponents takes them
+};
+
 /// Adjusts the maps that Relocalise has changed. A map of all keyframes refines the lens, the
 /// others keep it fixed. A map that explains more observations than the components it was made of
 /// replaces them. Rounds, iterations and seconds of the summaries include those of the replaced
 /// components, or of the rejected map.
-/// @param maps        indices of parts beyond the components denote frames that had no place.
-/// @param calibrated  the camera as it was given.
-/// @param tracks      the input of Relocalise; receive the observations of the accepted maps.
-/// @param refined     what Relocalise was given.
+/// @param maps     indices of parts beyond the components denote frames that had no place.
+/// @param tracks   the input of Relocalise; receive the observations of the accepted maps.
+/// @param refined  what Relocalise was given.
 /// @return  the keyframes that were moved.
 std::set<FrameId> RefineRelocalised(const std::vector<RelocalisedMap>& maps,
-                                    const std::vector<PureRotationSegment>& segments,
-                                    const Camera& calibrated,
-                                    BundleOptions options,
-                                    const TrackCompletion& complete,
+                                    const RelocalisedRefinement& refinement,
                                     std::vector<Track>& tracks,
                                     RefinedComponents& refined);
 

@@ -265,22 +265,43 @@ void Append(const std::vector<std::pair<TrackId, Observation>>& more,
   observations.insert(observations.end(), more.begin(), more.end());
 }
 
+// Adds the frames of a map, the displaced ones at their new place.
+// @param move    into the world of `now`.
+// @param stands  whether that is the world of the map.
+void AddFrames(const Reconstruction& map,
+               const Displaced& displaced,
+               const Similarity& move,
+               bool stands,
+               RelocalisedMap& now) {
+  for (const auto& [frame, center] : map.center_in_world) {
+    Rotation rotation = map.cam_from_world.at(frame);
+    Eigen::Vector3d place = center;
+    const bool is_displaced = displaced.frames().contains(frame);
+    if (is_displaced) {
+      const Similarity& own = *displaced.MoveOf(frame);
+      rotation = own.Move(rotation);
+      place = own.Move(place);
+    }
+    if (is_displaced || !stands) now.moved.insert(frame);
+    now.cam_from_world[frame] = move.Move(rotation);
+    now.center_in_world[frame] = move.Move(place);
+  }
+}
+
 }  // namespace
 
-std::vector<RelocalisedMap> Relocalise(const std::vector<const Reconstruction*>& maps,
-                                       const std::vector<Track>& tracks,
-                                       PlaceMatches& places,
-                                       const std::vector<Lookalike>& lookalikes,
-                                       const Camera& camera,
+std::vector<RelocalisedMap> Relocalise(const RelocalisationInputs& inputs,
                                        const RelocalisationOptions& options,
                                        std::uint64_t seed,
-                                       int num_threads) {
+                                       int num_threads,
+                                       PlaceMatches& places) {
   if (const auto problem = options.Problem()) {
     throw std::invalid_argument("RelocalisationOptions: " + *problem);
   }
-  const FrameFinder finder(maps, places, camera, options, seed);
-  std::vector<FoundFrame> all = FindAll(finder, lookalikes, num_threads);
-  std::vector<FoundFrame> more = FindAllByTracks(finder, tracks, num_threads);
+  const std::vector<const Reconstruction*>& maps = inputs.maps;
+  const FrameFinder finder(maps, places, inputs.camera, options, seed);
+  std::vector<FoundFrame> all = FindAll(finder, inputs.lookalikes, num_threads);
+  std::vector<FoundFrame> more = FindAllByTracks(finder, inputs.tracks, num_threads);
   std::move(more.begin(), more.end(), std::back_inserter(all));
   std::vector<const FoundFrame*> links;
   std::vector<std::vector<const FoundFrame*>> inside(maps.size());
@@ -300,25 +321,12 @@ std::vector<RelocalisedMap> Relocalise(const std::vector<const Reconstruction*>&
     RelocalisedMap now;
     now.parts = joined.PartsWith(k);
     for (const int part : now.parts) {
-      const Similarity& move = joined.MoveOf(part);
-      const bool stands = part == joined.LargestOf(now.parts);
       const Displaced displaced(finder, *maps[part], inside[part]);
       for (const FoundFrame* found : inside[part]) {
         if (displaced.IsTaken(*found)) Append(found->observations, now.observations);
       }
-      for (const auto& [frame, center] : maps[part]->center_in_world) {
-        Rotation rotation = maps[part]->cam_from_world.at(frame);
-        Eigen::Vector3d place = center;
-        const bool is_displaced = displaced.frames().contains(frame);
-        if (is_displaced) {
-          const Similarity& own = *displaced.MoveOf(frame);
-          rotation = own.Move(rotation);
-          place = own.Move(place);
-        }
-        if (is_displaced || !stands) now.moved.insert(frame);
-        now.cam_from_world[frame] = move.Move(rotation);
-        now.center_in_world[frame] = move.Move(place);
-      }
+      const bool stands = part == joined.LargestOf(now.parts);
+      AddFrames(*maps[part], displaced, joined.MoveOf(part), stands, now);
     }
     for (const FoundFrame* link : links) {
       if (now.parts.contains(finder.MapOf(link->frame)) &&

@@ -24,6 +24,15 @@ struct RelocalisedMap {
   std::set<FrameId> moved;  // frames whose place differs from that in the largest of the parts
 };
 
+/// Maps, and frames that look alike.
+struct RelocalisationInputs {
+  const std::vector<const Reconstruction*>& maps;  // each in its own world; no frame in two of them
+  // With the ids of the maps' points, and all observations, whether they fit or not.
+  const std::vector<Track>& tracks;
+  const std::vector<Lookalike>& lookalikes;
+  const Camera& camera;
+};
+
 /// Finds frames that are in a wrong place of the map.
 ///
 /// For each pair of similar frames, the pose of one is estimated anew from the points that the
@@ -33,8 +42,6 @@ struct RelocalisedMap {
 /// Frames that share more points with the moved ones than with the rest move with them. Maps that
 /// see the same points are merged. The results are start values; bundle adjustment decides whether
 /// they are better.
-/// @param maps    each in its own world; no frame in two of them.
-/// @param tracks  with the ids of the maps' points, and all observations, whether they fit or not.
 /// @param places  pass the same object to later calls, which use its matches again.
 /// @return  the maps that change; the same at any `num_threads`. Throws std::invalid_argument when
 /// an option is out of range.
@@ -42,13 +49,10 @@ struct RelocalisedMap {
 /// Cost:    20 ms for each pair, 100 ms where neighbours are needed.
 /// Source:  Mur-Artal and Tardos, ORB-SLAM2, 2017, sec. III-E, for the relocalisation of a single
 ///          frame. The choice of the frame that moves is ours.
-std::vector<RelocalisedMap> Relocalise(const std::vector<const Reconstruction*>& maps,
-                                       const std::vector<Track>& tracks,
-                                       PlaceMatches& places,
-                                       const std::vector<Lookalike>& lookalikes,
-                                       const Camera& camera,
+std::vector<RelocalisedMap> Relocalise(const RelocalisationInputs& inputs,
                                        const RelocalisationOptions& options,
                                        std::uint64_t seed,
-                                       int num_threads);
+                                       int num_threads,
+                                       PlaceMatches& places);
 
 }  // namespace rotslam

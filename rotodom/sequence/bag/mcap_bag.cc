@@ -2,7 +2,6 @@
 // and content; chunks hold schemas, channels and messages again, compressed or not.
 
 #include <algorithm>
-#include <array>
 #include <map>
 #include <stdexcept>
 #include <string_view>
@@ -12,6 +11,7 @@
 #include "rotodom/sequence/bag/bag_reader.h"
 #include "rotodom/sequence/bag/byte_reader.h"
 #include "rotodom/sequence/bag/decompress.h"
+#include "rotodom/sequence/crc32.h"
 
 namespace rotslam {
 namespace {
@@ -27,24 +27,6 @@ enum class McapOp : unsigned char {
   kChunk = 0x06,
   kDataEnd = 0x0f,
 };
-
-// CRC-32 as in PNG and zlib.
-std::uint32_t McapCrc32(std::string_view bytes) {
-  static const std::array<std::uint32_t, 256> table = [] {
-    std::array<std::uint32_t, 256> entries;
-    for (std::uint32_t byte = 0; byte < 256; ++byte) {
-      std::uint32_t value = byte;
-      for (int bit = 0; bit < 8; ++bit) value = (value >> 1) ^ ((value & 1) != 0 ? 0xedb88320 : 0);
-      entries[byte] = value;
-    }
-    return entries;
-  }();
-  std::uint32_t crc = 0xffffffff;
-  for (const char byte : bytes) {
-    crc = (crc >> 8) ^ table[(crc ^ static_cast<unsigned char>(byte)) & 0xff];
-  }
-  return ~crc;
-}
 
 // ROS 2 puts "msg" between the package and the name of a type.
 std::string PlainType(std::string type) {
@@ -154,7 +136,7 @@ class McapBag : public BagReader {
     std::string_view bytes;
     try {
       bytes = file_.Decompressed(chunk);
-      if (crc != 0 && McapCrc32(bytes) != crc) {
+      if (crc != 0 && Crc32(bytes) != crc) {
         file_.Fail("chunk at byte " + std::to_string(records_begin) + ": checksum is wrong");
       }
     } catch (const std::runtime_error& error) {

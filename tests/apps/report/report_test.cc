@@ -376,7 +376,19 @@ TEST_F(Report, FiguresAreDrawnTwice) {
     cv::inRange(image, cv::Scalar(0, 0, 0), cv::Scalar(160, 160, 160), ink);
     EXPECT_GT(cv::countNonZero(ink), 300);
   }
-  EXPECT_THAT(names, ElementsAre("trajectory", "orientation", "errors", "runtime"));
+  EXPECT_THAT(names,
+              ElementsAre("trajectory",
+                          "orientation",
+                          "errors",
+                          "runtime",
+                          "relative_rotations",
+                          "averaging",
+                          "view_graph",
+                          "motion",
+                          "tracks",
+                          "keyframes",
+                          "registration",
+                          "residuals"));
   EXPECT_THAT(figures[0].drawing.Svg(),
               testing::AllOf(HasSubstr(">forward, from above</text>"),
                              HasSubstr(">scale assumed</text>"),
@@ -390,6 +402,33 @@ TEST_F(Report, FiguresAreDrawnTwice) {
               testing::AllOf(HasSubstr(">roll, deg</text>"), HasSubstr(">time, s</text>")));
   EXPECT_THAT(figures[2].drawing.Svg(), HasSubstr(">position, m</text>"));
   EXPECT_THAT(figures[3].drawing.Svg(), HasSubstr(">tracking</text>"));
+}
+
+std::string SvgOf(const std::vector<Figure>& figures, const std::string& name) {
+  for (const Figure& figure : figures) {
+    if (figure.name == name) return figure.drawing.Svg();
+  }
+  return "";
+}
+
+TEST_F(Report, FiguresOfStagesFollowTheSummary) {
+  AddPositions();
+  RunData run = ReadRunData(Run());
+  EXPECT_EQ(SvgOf(MakeFigures(run), "known_rotation"), "");
+  EXPECT_EQ(SvgOf(MakeFigures(run), "rolling_shutter"), "");
+  EXPECT_EQ(SvgOf(MakeFigures(run), "motion_blur"), "");
+  EXPECT_EQ(SvgOf(MakeFigures(run), "averaging"), "") << "no ground truth";
+  run.summary["krot"] = {{"gamma_low_px", 3.0}, {"gamma_high_px", 3.5}};
+  run.summary["camera"]["readout_s"] = 0.02;
+  run.summary["rotodom"] = {{"exposure_s", 0.01}};
+  const std::vector<Figure> figures = MakeFigures(run);
+  EXPECT_THAT(SvgOf(figures, "known_rotation"), HasSubstr(">bracket of the largest residual<"));
+  EXPECT_THAT(SvgOf(figures, "rolling_shutter"), HasSubstr(">length, px</text>"));
+  EXPECT_THAT(SvgOf(figures, "motion_blur"), HasSubstr(">length of the blur vector</text>"));
+  EXPECT_THAT(SvgOf(figures, "view_graph"),
+              testing::AllOf(HasSubstr(">loop</text>"), HasSubstr("refused</text>")));
+  // 0.03 rad a frame, 300 px, 0.1 s between frames, open for a tenth of that: 0.9 px.
+  EXPECT_THAT(SvgOf(figures, "motion_blur"), testing::ContainsRegex(">0\\.(8999|9000)"));
 }
 
 }  // namespace

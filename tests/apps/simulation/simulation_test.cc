@@ -179,7 +179,7 @@ TEST(RenderFrame, PixelIsTheAverageOverItsSquare) {
   for (const int k : {0, 10}) {
     const StampedPose& pose = room.Truth()[k];
     const cv::Mat image = RenderFrame(
-        world, {}, PixelRays(camera), [&](double) { return pose; }, 0.0, 0, options);
+        {world, {}}, PixelRays(camera), [&](double) { return pose; }, {0.0, 0}, options);
     const auto mean_square = [&](double shift_x, double shift_y) {
       constexpr int kRays = 4;
       double sum = 0.0;
@@ -234,7 +234,7 @@ TEST_P(RolledPicture, IsMadeOfPicturesAtTheTimesOfItsRows) {
   const World world = MakeRoom(options.seed);
   const auto pose_at = [&](double time_s) { return global.PoseAt(time_s); };
   const auto picture = [&](const Camera& camera, double time_s) {
-    return RenderFrame(world, {}, PixelRays(camera), pose_at, time_s, 0, options.render);
+    return RenderFrame({world, {}}, PixelRays(camera), pose_at, {time_s, 0}, options.render);
   };
   const double time_s = global.Truth()[3].timestamp_s;
   const cv::Mat rolled = picture(rolling, time_s);

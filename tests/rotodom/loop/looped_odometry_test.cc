@@ -76,8 +76,8 @@ LoopedRun Follow(const std::vector<cv::Mat>& images,
                  const OdometryOptions& odometry_options = FewFeatures(),
                  const LoopOptions& loop_options = {},
                  int num_threads = 1) {
-  LoopedOdometry odometry(
-      SmallCamera(), odometry_options, loop_options, nullptr, true, 1, num_threads);
+  LoopedOdometry odometry(SmallCamera(),
+                          {odometry_options, loop_options, nullptr, true, 1, num_threads});
   LoopedRun run;
   const auto keep_accepted = [&](const std::vector<LoopCheck>& checks) {
     for (const LoopCheck& check : checks) {
@@ -254,7 +254,7 @@ TEST(LoopedOdometry, IsTheOdometryWhereNothingComesBack) {
 }
 
 TEST(LoopedOdometry, GivesAwayThePlacesThatItRemembers) {
-  LoopedOdometry odometry(SmallCamera(), FewFeatures(), {}, nullptr, true, 1, 1);
+  LoopedOdometry odometry(SmallCamera(), {FewFeatures()});
   for (int k = 0; k < 10; ++k) odometry.AddFrame(FrameId{k}, k / kFps, Images()[k]);
   odometry.Finish();
   const int num_places = odometry.num_places();
@@ -337,7 +337,7 @@ class GoingOn : public testing::TestWithParam<UpdatesKeyframes> {
     loops.min_correction_deg = 0.0;  // every loop is averaged
     loops.handover_frames = 3;
     return LoopedOdometry(
-        camera, FewFeatures(), loops, nullptr, GetParam().keep_features, 1, num_threads);
+        camera, {FewFeatures(), loops, nullptr, GetParam().keep_features, 1, num_threads});
   }
 };
 INSTANTIATE_TEST_SUITE_P(LoopedOdometry,
@@ -388,14 +388,14 @@ TEST_P(GoingOn, IsTheSameToTheLastBit) {
 }
 
 TEST(LoopedOdometry, ANewOneStandsWhereNothingHasBeenSeen) {
-  LoopedOdometry odometry(SmallCamera(), FewFeatures(), {}, nullptr, true, 1, 1);
+  LoopedOdometry odometry(SmallCamera(), {FewFeatures()});
   const std::string state = odometry.SaveState();
   odometry.RestoreState(state);
   EXPECT_EQ(odometry.SaveState(), state);
 }
 
 TEST(LoopedOdometry, NoticesAStateThatIsCutShort) {
-  LoopedOdometry odometry(SmallCamera(), FewFeatures(), {}, nullptr, true, 1, 1);
+  LoopedOdometry odometry(SmallCamera(), {FewFeatures()});
   for (int k = 0; k < 6; ++k) odometry.AddFrame(FrameId{k}, k / kFps, Images()[k]);
   const std::string state = odometry.SaveState();
   odometry.RestoreState(state);
@@ -414,7 +414,7 @@ TEST(LoopedOdometry, KnowsEveryFramesCovariance) {
 TEST(LoopedOdometry, RefusesOptionsOutOfRange) {
   const auto message = [](const LoopOptions& options) -> std::string {
     try {
-      const LoopedOdometry odometry(SmallCamera(), {}, options, nullptr, false, 1, 1);
+      const LoopedOdometry odometry(SmallCamera(), {{}, options, nullptr, false});
     } catch (const std::invalid_argument& error) {
       return error.what();
     }

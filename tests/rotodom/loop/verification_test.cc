@@ -95,12 +95,7 @@ struct Case {
     std::vector<const Features*> places;
     places.reserve(old_places.size());
     for (const Features& place : old_places) places.push_back(&place);
-    return VerifyLoop(view,
-                      places,
-                      cam_from_world,
-                      rates,
-                      num_consistent,
-                      are_linked,
+    return VerifyLoop({view, places, cam_from_world, rates, num_consistent, are_linked},
                       scene.camera,
                       options,
                       tools);

@@ -34,7 +34,7 @@ double ShareWithBaseline(PairSceneOptions scene_options,
     scene_options.seed = 1000 + k;
     const PairScene scene = MakePairScene(scene_options);
     const auto estimate =
-        EstimateRelativeRotation(scene.pairs, scene.j_from_i, kPairFocalPx, options, 1);
+        EstimateRelativeRotation({scene.pairs}, scene.j_from_i, kPairFocalPx, options, 1);
     count += !estimate || estimate->baseline.ShowsBaseline();
   }
   return static_cast<double>(count) / num_scenes;
@@ -110,7 +110,8 @@ TEST(TestBaseline, CovariancesTellAScenesEdgesFromABaseline) {
     const std::vector<KeypointCovariances> covariances(scene.pairs.size(),
                                                        {Eigen::Matrix2d::Zero(), covariance_px});
     const auto evidence = [&](std::span<const KeypointCovariances> known) {
-      return EstimateRelativeRotation(scene.pairs, scene.j_from_i, kPairFocalPx, options, 1, known)
+      return EstimateRelativeRotation(
+                 {scene.pairs, known}, scene.j_from_i, kPairFocalPx, options, 1)
           ->baseline;
     };
     with += evidence(covariances).ShowsBaseline();
@@ -124,7 +125,7 @@ TEST(TestBaseline, RefusesAnotherNumberOfCovariances) {
   const PairScene scene = MakePairScene({.num_pairs = 50});
   const std::vector<KeypointCovariances> covariances(49);
   EXPECT_THROW(
-      EstimateRelativeRotation(scene.pairs, scene.j_from_i, kPairFocalPx, {}, 1, covariances),
+      EstimateRelativeRotation({scene.pairs, covariances}, scene.j_from_i, kPairFocalPx, {}, 1),
       std::invalid_argument);
 }
 

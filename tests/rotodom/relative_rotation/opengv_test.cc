@@ -48,7 +48,7 @@ TEST(EstimateRelativeRotation, LadderAgainstOpenGv) {
                                                  .outlier_ratio = outliers,
                                                  .seed = std::uint64_t(300 + k)});
           const auto estimate =
-              EstimateRelativeRotation(scene.pairs, Rotation(), kPairFocalPx, {}, 1);
+              EstimateRelativeRotation({scene.pairs}, Rotation(), kPairFocalPx, {}, 1);
           ASSERT_TRUE(estimate);
           ours.push_back(ErrorDeg(estimate->j_from_i, scene));
           const OpenGvReference reference(scene.pairs, kPairFocalPx);

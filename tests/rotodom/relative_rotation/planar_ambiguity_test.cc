@@ -119,7 +119,7 @@ double AngleDeg(const RelativeRotationEstimate& estimate, const Rotation& j_from
 std::vector<RelativeRotationEstimate> EstimateFromAmbiguity(const WallScene& scene,
                                                             const EpipolarModel& twin,
                                                             std::uint64_t sample_seed = 1) {
-  return EstimateRotationHypotheses(scene.pairs, twin.j_from_i, kWallFocalPx, {}, sample_seed);
+  return EstimateRotationHypotheses({scene.pairs}, twin.j_from_i, kWallFocalPx, {}, sample_seed);
 }
 
 // Some points off the wall tell the two apart, whatever the seed of the samples.
@@ -172,8 +172,8 @@ TEST(EstimateRotationHypotheses, HasBothMotionsOfAWall) {
 TEST(EstimateRotationHypotheses, IsOneWherePointsHaveDepth) {
   for (std::uint64_t seed = 1; seed <= 20; ++seed) {
     const WallScene scene = MakeWallScene({.noise_px = 0.15, .off_wall_ratio = 0.6, .seed = seed});
-    const auto estimates =
-        EstimateRotationHypotheses(scene.pairs, scene.truth.j_from_i, kWallFocalPx, {}, /*seed=*/1);
+    const auto estimates = EstimateRotationHypotheses(
+        {scene.pairs}, scene.truth.j_from_i, kWallFocalPx, {}, /*seed=*/1);
     ASSERT_EQ(estimates.size(), 1u) << seed;
     EXPECT_LT(AngleDeg(estimates.front(), scene.truth.j_from_i), 1.0) << seed;
   }
@@ -183,7 +183,7 @@ TEST(EstimateRotationHypotheses, IsEmptyForTooFewPairs) {
   WallScene scene = MakeWallScene({});
   scene.pairs.resize(9);
   EXPECT_TRUE(
-      EstimateRotationHypotheses(scene.pairs, scene.truth.j_from_i, kWallFocalPx, {}, 1).empty());
+      EstimateRotationHypotheses({scene.pairs}, scene.truth.j_from_i, kWallFocalPx, {}, 1).empty());
 }
 
 }  // namespace

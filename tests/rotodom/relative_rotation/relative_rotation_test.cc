@@ -26,7 +26,7 @@ double MedianErrorDeg(PairSceneOptions scene_options, int num_scenes) {
   for (int k = 0; k < num_scenes; ++k) {
     scene_options.seed = 100 + k;
     const PairScene scene = MakePairScene(scene_options);
-    const auto estimate = EstimateRelativeRotation(scene.pairs, Rotation(), kPairFocalPx, {}, 1);
+    const auto estimate = EstimateRelativeRotation({scene.pairs}, Rotation(), kPairFocalPx, {}, 1);
     errors.push_back(estimate ? ErrorDeg(estimate->j_from_i, scene.j_from_i) : 180.0);
   }
   std::sort(errors.begin(), errors.end());
@@ -99,7 +99,8 @@ TEST(EstimateRelativeRotation, ChoosesRotationOnlyByEvidence) {
     const auto choice = [&](double baseline) {
       const PairScene scene =
           MakePairScene({.baseline_over_depth = baseline, .seed = std::uint64_t(10 + k)});
-      return EstimateRelativeRotation(scene.pairs, Rotation(), kPairFocalPx, {}, 1)->rotation_only;
+      return EstimateRelativeRotation({scene.pairs}, Rotation(), kPairFocalPx, {}, 1)
+          ->rotation_only;
     };
     chosen_without_baseline += choice(0.0);
     chosen_with_baseline += choice(0.03);
@@ -110,7 +111,7 @@ TEST(EstimateRelativeRotation, ChoosesRotationOnlyByEvidence) {
 
 TEST(EstimateRelativeRotation, TranslationPointsForward) {
   const PairScene scene = MakePairScene({.noise_px = 0.1});
-  const auto estimate = EstimateRelativeRotation(scene.pairs, Rotation(), kPairFocalPx, {}, 1);
+  const auto estimate = EstimateRelativeRotation({scene.pairs}, Rotation(), kPairFocalPx, {}, 1);
   ASSERT_TRUE(estimate);
   EXPECT_GT(estimate->translation_direction.dot(scene.translation_direction), 0.999);
 }
@@ -129,7 +130,7 @@ TEST(EstimateRelativeRotation, KnowsTheMotionAlongAPlane) {
                                                .plane = true,
                                                .seed = std::uint64_t(300 + k)});
         const auto estimate =
-            EstimateRelativeRotation(scene.pairs, Rotation(), kPairFocalPx, {}, 1);
+            EstimateRelativeRotation({scene.pairs}, Rotation(), kPairFocalPx, {}, 1);
         ASSERT_TRUE(estimate);
         num_wrong += ErrorDeg(estimate->j_from_i, scene.j_from_i) > 0.5 * baseline * kDegFromRad;
       }
@@ -142,7 +143,7 @@ TEST(EstimateRelativeRotation, SurvivesABadPrediction) {
   const PairScene scene =
       MakePairScene({.baseline_over_depth = 0.02, .outlier_ratio = 0.2, .rotation_deg = 8.0});
   const Rotation bad = Rotation::Exp({0.3, -0.3, 0.2});
-  const auto estimate = EstimateRelativeRotation(scene.pairs, bad, kPairFocalPx, {}, 1);
+  const auto estimate = EstimateRelativeRotation({scene.pairs}, bad, kPairFocalPx, {}, 1);
   ASSERT_TRUE(estimate);
   EXPECT_LT(ErrorDeg(estimate->j_from_i, scene.j_from_i), 0.3);
 }
@@ -151,8 +152,8 @@ TEST(EstimateRelativeRotation, ReadBackwardsIsTheInverse) {
   const PairScene scene = MakePairScene({.noise_px = 0.2});
   std::vector<BearingPair> backwards;
   for (const BearingPair& pair : scene.pairs) backwards.push_back({pair.bearing_j, pair.bearing_i});
-  const auto forward = EstimateRelativeRotation(scene.pairs, Rotation(), kPairFocalPx, {}, 1);
-  const auto backward = EstimateRelativeRotation(backwards, Rotation(), kPairFocalPx, {}, 1);
+  const auto forward = EstimateRelativeRotation({scene.pairs}, Rotation(), kPairFocalPx, {}, 1);
+  const auto backward = EstimateRelativeRotation({backwards}, Rotation(), kPairFocalPx, {}, 1);
   ASSERT_TRUE(forward && backward);
   EXPECT_LT((forward->j_from_i * backward->j_from_i).AngleDeg(), 1e-4);
 }
@@ -189,7 +190,7 @@ TEST(EstimateRelativeRotation, CovarianceIsOfTheRightSize) {
                                              .outlier_ratio = rung.outlier_ratio,
                                              .seed = std::uint64_t(200 + k)});
       const auto estimate =
-          EstimateRelativeRotation(scene.pairs, Rotation(), kPairFocalPx, options, 1);
+          EstimateRelativeRotation({scene.pairs}, Rotation(), kPairFocalPx, options, 1);
       ASSERT_TRUE(estimate);
       const Eigen::Vector3d delta = (scene.j_from_i * estimate->j_from_i.Inverse()).Log();
       sum += delta.dot(estimate->covariance.inverse() * delta) / 3.0;
@@ -213,7 +214,7 @@ TEST(EstimateRelativeRotation, TranslationCovarianceIsOfTheRightSize) {
                                                .noise_px = noise_px,
                                                .seed = std::uint64_t(200 + k)});
         const auto estimate =
-            EstimateRelativeRotation(scene.pairs, Rotation(), kPairFocalPx, {}, 1);
+            EstimateRelativeRotation({scene.pairs}, Rotation(), kPairFocalPx, {}, 1);
         ASSERT_TRUE(estimate && !estimate->rotation_only);
         const Eigen::Vector3d& t = estimate->translation_direction;
         EXPECT_LT((estimate->translation_covariance * t).norm(),
@@ -234,9 +235,10 @@ TEST(EstimateRelativeRotation, ATurnIsUncertainByTheSharedError) {
   const PairScene scene = MakePairScene({.baseline_over_depth = 0.0, .noise_px = 0.1});
   RelativeRotationOptions options;
   options.shared_error_px = 0.0;
-  const auto without = EstimateRelativeRotation(scene.pairs, Rotation(), kPairFocalPx, options, 1);
+  const auto without =
+      EstimateRelativeRotation({scene.pairs}, Rotation(), kPairFocalPx, options, 1);
   options.shared_error_px = 0.07;
-  const auto with = EstimateRelativeRotation(scene.pairs, Rotation(), kPairFocalPx, options, 1);
+  const auto with = EstimateRelativeRotation({scene.pairs}, Rotation(), kPairFocalPx, options, 1);
   ASSERT_TRUE(without && with && without->rotation_only && with->rotation_only);
   const double shared = 0.5 * 0.07 / kPairFocalPx;
   const Eigen::Matrix3d expected =
@@ -259,8 +261,10 @@ TEST(EstimateRelativeRotation, KnowingTheNoiseOfMatchesHelps) {
                                              .seed = std::uint64_t(400 + k)});
       std::vector<BearingPair> ignorant = scene.pairs;
       for (BearingPair& pair : ignorant) pair.noise.reset();
-      const auto with = EstimateRelativeRotation(scene.pairs, Rotation(), kPairFocalPx, options, 1);
-      const auto without = EstimateRelativeRotation(ignorant, Rotation(), kPairFocalPx, options, 1);
+      const auto with =
+          EstimateRelativeRotation({scene.pairs}, Rotation(), kPairFocalPx, options, 1);
+      const auto without =
+          EstimateRelativeRotation({ignorant}, Rotation(), kPairFocalPx, options, 1);
       ASSERT_TRUE(with && without);
       squared_with += std::pow(ErrorDeg(with->j_from_i, scene.j_from_i), 2);
       squared_without += std::pow(ErrorDeg(without->j_from_i, scene.j_from_i), 2);
@@ -280,8 +284,8 @@ TEST(EstimateRelativeRotation, NominalNoiseSpeltOutChangesNothing) {
   const PairScene scene = MakePairScene({.baseline_over_depth = 0.02, .outlier_ratio = 0.2});
   std::vector<BearingPair> spelt_out = scene.pairs;
   for (BearingPair& pair : spelt_out) pair.noise = MatchNoise{};
-  const auto a = EstimateRelativeRotation(scene.pairs, Rotation(), kPairFocalPx, {}, 1);
-  const auto b = EstimateRelativeRotation(spelt_out, Rotation(), kPairFocalPx, {}, 1);
+  const auto a = EstimateRelativeRotation({scene.pairs}, Rotation(), kPairFocalPx, {}, 1);
+  const auto b = EstimateRelativeRotation({spelt_out}, Rotation(), kPairFocalPx, {}, 1);
   ASSERT_TRUE(a && b);
   EXPECT_LT(ErrorDeg(a->j_from_i, b->j_from_i), 1e-5);
   EXPECT_EQ(a->inliers, b->inliers);
@@ -305,8 +309,8 @@ TEST(EstimateRelativeRotation, WrongMatchesOfLongFlowDoNotPull) {
 
 TEST(EstimateRelativeRotation, SameSeedSameBytes) {
   const PairScene scene = MakePairScene({.outlier_ratio = 0.4});
-  const auto a = EstimateRelativeRotation(scene.pairs, Rotation(), kPairFocalPx, {}, 7);
-  const auto b = EstimateRelativeRotation(scene.pairs, Rotation(), kPairFocalPx, {}, 7);
+  const auto a = EstimateRelativeRotation({scene.pairs}, Rotation(), kPairFocalPx, {}, 7);
+  const auto b = EstimateRelativeRotation({scene.pairs}, Rotation(), kPairFocalPx, {}, 7);
   ASSERT_TRUE(a && b);
   EXPECT_EQ(a->j_from_i.Quaternion().coeffs(), b->j_from_i.Quaternion().coeffs());
   EXPECT_EQ(a->inliers, b->inliers);
@@ -317,13 +321,13 @@ TEST(EstimateRelativeRotation, SaysNoToTooFewOrSenselessMatches) {
   RelativeRotationOptions strict;
   strict.min_inliers = 100;
   const PairScene nonsense = MakePairScene({.num_pairs = 200, .outlier_ratio = 1.0});
-  EXPECT_FALSE(EstimateRelativeRotation(nonsense.pairs, Rotation(), kPairFocalPx, strict, 1));
+  EXPECT_FALSE(EstimateRelativeRotation({nonsense.pairs}, Rotation(), kPairFocalPx, strict, 1));
 }
 
 TEST(EstimateRelativeRotation, OneMatchRepeatedFixesNothing) {
   const PairScene scene = MakePairScene({.num_pairs = 1});
   const std::vector<BearingPair> repeated(200, scene.pairs.front());
-  const auto estimate = EstimateRelativeRotation(repeated, Rotation(), kPairFocalPx, {}, 1);
+  const auto estimate = EstimateRelativeRotation({repeated}, Rotation(), kPairFocalPx, {}, 1);
   // The turn about the bearing is free: nothing, or a variance beyond any use.
   EXPECT_TRUE(!estimate || estimate->covariance.trace() > 1.0);
 }
@@ -332,7 +336,7 @@ TEST(EstimateRelativeRotation, OneMatchRepeatedFixesNothing) {
 TEST(EstimateRelativeRotation, RepeatedMatchesDoNoHarm) {
   PairScene scene = MakePairScene({.num_pairs = 100, .noise_px = 0.2});
   for (int k = 0; k < 100; ++k) scene.pairs.push_back(scene.pairs[k % 5]);
-  const auto estimate = EstimateRelativeRotation(scene.pairs, Rotation(), kPairFocalPx, {}, 1);
+  const auto estimate = EstimateRelativeRotation({scene.pairs}, Rotation(), kPairFocalPx, {}, 1);
   ASSERT_TRUE(estimate);
   EXPECT_LT(ErrorDeg(estimate->j_from_i, scene.j_from_i), 0.2);
 }
@@ -341,14 +345,14 @@ TEST(EstimateRelativeRotation, RejectsABrokenContract) {
   PairScene scene = MakePairScene({});
   RelativeRotationOptions bad;
   bad.inlier_px = -1.0;
-  EXPECT_THROW(EstimateRelativeRotation(scene.pairs, Rotation(), kPairFocalPx, bad, 1),
+  EXPECT_THROW(EstimateRelativeRotation({scene.pairs}, Rotation(), kPairFocalPx, bad, 1),
                std::invalid_argument);
   scene.pairs[3].bearing_i.x() = std::numeric_limits<double>::quiet_NaN();
-  EXPECT_THROW(EstimateRelativeRotation(scene.pairs, Rotation(), kPairFocalPx, {}, 1),
+  EXPECT_THROW(EstimateRelativeRotation({scene.pairs}, Rotation(), kPairFocalPx, {}, 1),
                std::invalid_argument);
   scene = MakePairScene({});
   scene.pairs[3].noise = MatchNoise{-Eigen::Matrix2d::Identity(), 1.0};
-  EXPECT_THROW(EstimateRelativeRotation(scene.pairs, Rotation(), kPairFocalPx, {}, 1),
+  EXPECT_THROW(EstimateRelativeRotation({scene.pairs}, Rotation(), kPairFocalPx, {}, 1),
                std::invalid_argument);
 }
 

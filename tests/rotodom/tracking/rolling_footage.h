@@ -25,7 +25,7 @@ struct RollingFootage {
   RotationMap cam_from_world;
 
   std::optional<ReadoutEstimate> Estimate(int num_threads = 2) const {
-    return EstimateReadout(camera, frames, graph, cam_from_world, {}, num_threads);
+    return EstimateReadout(camera, {frames, graph, cam_from_world}, {}, num_threads);
   }
 };
 

@@ -61,10 +61,10 @@ TEST(DetectPureRotation, BelievesInATurnThatAnotherLensExplains) {
   const BaScene scene = MakeScene(true);
   const BundleProblem start = PerturbedProblem(scene, 0.3, 0.0);
   for (const double factor : {0.94, 1.06}) {
-    const auto turning = DetectPureRotation(
+    const auto rotating = DetectPureRotation(
         WithFocal(scene.camera, factor), start.start.cam_from_world, start.start.tracks, {}, {});
-    ASSERT_TRUE(turning.has_value()) << factor;
-    EXPECT_NEAR(turning->camera.fx / scene.camera.fx, 1.0, 2e-3) << factor;
+    ASSERT_TRUE(rotating.has_value()) << factor;
+    EXPECT_NEAR(rotating->camera.fx / scene.camera.fx, 1.0, 2e-3) << factor;
   }
 }
 
@@ -101,11 +101,11 @@ TEST(DetectPureRotation, LeavesAGoodCalibrationToTheTestOfPairs) {
 
 TEST(DetectPureRotation, BelievesInATurnWhereThereIsNoMap) {
   const BaScene scene = MakeScene(true);
-  const auto turning =
+  const auto rotating =
       DetectPureRotation(scene.camera, scene.truth.cam_from_world, scene.truth.tracks, {}, {});
-  ASSERT_TRUE(turning.has_value());
-  EXPECT_FALSE(turning->lens_refined);
-  EXPECT_EQ(turning->camera, scene.camera);
+  ASSERT_TRUE(rotating.has_value());
+  EXPECT_FALSE(rotating->lens_refined);
+  EXPECT_EQ(rotating->camera, scene.camera);
 }
 
 TEST(DetectPureRotation, NeverBelievesThatAStreetIsATurn) {
@@ -125,10 +125,10 @@ TEST(DetectPureRotation, GivesWayToPositionsThatExplainMoreClosely) {
   const BaScene scene = SceneOffAxis(0.4, 0.2);
   const BundleResult moving = RefineBundle(PerturbedProblem(scene, 0.0, 0.0), {});
   ASSERT_TRUE(moving.Usable());
-  const PureRotationResult turning =
+  const PureRotationResult rotating =
       RefinePureRotation(scene.camera, scene.truth.cam_from_world, scene.truth.tracks, {});
   const Explanation by_moving = ExplanationBy({moving.summary});
-  EXPECT_GT(ExplanationBy(turning).redundancy, by_moving.redundancy);
+  EXPECT_GT(ExplanationBy(rotating).redundancy, by_moving.redundancy);
   EXPECT_FALSE(DetectPureRotation(
                    scene.camera, scene.truth.cam_from_world, scene.truth.tracks, by_moving, {})
                    .has_value());
@@ -137,12 +137,12 @@ TEST(DetectPureRotation, GivesWayToPositionsThatExplainMoreClosely) {
 TEST(DetectPureRotation, GivesWayToPositionsThatExplainMore) {
   const BaScene scene = MakeScene(true);
   const Camera camera = WithFocal(scene.camera, 1.06);
-  const auto turning =
+  const auto rotating =
       DetectPureRotation(camera, scene.truth.cam_from_world, scene.truth.tracks, {}, {});
-  ASSERT_TRUE(turning.has_value());
+  ASSERT_TRUE(rotating.has_value());
   EXPECT_FALSE(
       DetectPureRotation(
-          camera, scene.truth.cam_from_world, scene.truth.tracks, ExplanationBy(*turning), {})
+          camera, scene.truth.cam_from_world, scene.truth.tracks, ExplanationBy(*rotating), {})
           .has_value());
 }
 

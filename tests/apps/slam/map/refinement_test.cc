@@ -68,8 +68,8 @@ BundleResult SolveChain(const Scene& scene, KrotStart start) {
   const KrotSolution krot =
       SolveKnownRotation(scene.cam_from_world, scene.tracks, scene.camera, krot_options);
   EXPECT_TRUE(krot.Usable()) << krot.message;
-  RefinedComponents refined =
-      RefineComponents(scene.cam_from_world, krot, scene.tracks, {}, scene.camera, {});
+  RefinedComponents refined = RefineComponents(
+      {scene.cam_from_world, krot.center_in_world, scene.tracks}, krot.component, scene.camera, {});
   EXPECT_EQ(refined.bundles.size(), 1U);
   EXPECT_TRUE(refined.bundles.front().Usable()) << refined.bundles.front().message;
   return std::move(refined.bundles.front());
@@ -146,7 +146,8 @@ class TwoComponents : public testing::Test {
     }
     const KrotSolution krot =
         SolveKnownRotation(scene_.cam_from_world, tracks_, scene_.camera, KrotOptions());
-    refined_ = RefineComponents(scene_.cam_from_world, krot, tracks_, {}, scene_.camera, {});
+    refined_ = RefineComponents(
+        {scene_.cam_from_world, krot.center_in_world, tracks_}, krot.component, scene_.camera, {});
   }
 
   // The late views as far away as that.
@@ -198,8 +199,8 @@ TEST_F(TwoComponents, BecomeOneThatExplainsMore) {
   const std::vector<BundleResult> parts = refined_.bundles;
   const int num_seen = NumObservations(tracks_);
   refined_.camera.fx *= 1.01;  // as a lens that made up for frames in a wrong place
-  const std::set<FrameId> moved = RefineRelocalised(
-      {WholeMap({0.3, 0.0, 0.2})}, {}, scene_.camera, {}, nullptr, tracks_, refined_);
+  const std::set<FrameId> moved =
+      RefineRelocalised({WholeMap({0.3, 0.0, 0.2})}, {scene_.camera}, tracks_, refined_);
   EXPECT_EQ(moved.size(), 10U);
   EXPECT_EQ(refined_.camera.fx, scene_.camera.fx);
   EXPECT_EQ(NumObservations(tracks_), num_seen + static_cast<int>(common_.size()));
@@ -218,8 +219,7 @@ TEST_F(TwoComponents, StayWhereTheOneExplainsLess) {
   }
   const std::vector<BundleResult> parts = refined_.bundles;
   const int num_seen = NumObservations(tracks_);
-  EXPECT_TRUE(
-      RefineRelocalised({wrong}, {}, scene_.camera, {}, nullptr, tracks_, refined_).empty());
+  EXPECT_TRUE(RefineRelocalised({wrong}, {scene_.camera}, tracks_, refined_).empty());
   EXPECT_EQ(NumObservations(tracks_), num_seen);
   EXPECT_EQ(refined_.components.size(), 2U);
   ASSERT_EQ(refined_.bundles.size(), 2U);
@@ -253,16 +253,15 @@ struct LostView {
     }
     const KrotSolution krot =
         SolveKnownRotation(scene.cam_from_world, tracks, scene.camera, KrotOptions());
-    refined = RefineComponents(scene.cam_from_world, krot, tracks, {}, scene.camera, {});
+    refined = RefineComponents(
+        {scene.cam_from_world, krot.center_in_world, tracks}, krot.component, scene.camera, {});
     map.parts = {0, 1};
     map.cam_from_world = scene.cam_from_world;
     map.center_in_world = scene.true_center_in_world;
     map.moved = {kLost};
   }
 
-  bool IsAdded() {
-    return !RefineRelocalised({map}, {}, scene.camera, {}, nullptr, tracks, refined).empty();
-  }
+  bool IsAdded() { return !RefineRelocalised({map}, {scene.camera}, tracks, refined).empty(); }
 };
 
 TEST(RefineRelocalised, AddsAViewThoughOthersLoseSomeObservations) {

@@ -41,7 +41,7 @@ std::map<FrameId, ResectionStart> StartsOf(const Scene& scene) {
 TEST(ResectFrames, FindsPosesFromThePointsThatTheFramesSee) {
   const Scene scene = NoisyRing();
   const auto poses =
-      ResectFrames(StartsOf(scene), scene.true_point_in_world, scene.tracks, scene.camera, {}, 2);
+      ResectFrames(StartsOf(scene), {scene.true_point_in_world, scene.tracks}, scene.camera, {}, 2);
   ASSERT_EQ(poses.size(), 8U);
   for (const auto& [frame, pose] : poses) {
     EXPECT_LT((pose.center_in_world - scene.true_center_in_world.at(frame)).norm(), 0.01);
@@ -67,7 +67,7 @@ TEST(ResectFrames, LeavesOutFramesThatSeeTooLittle) {
   }
   auto starts = StartsOf(scene);
   starts.erase(FrameId{0});
-  const auto poses = ResectFrames(starts, points, scene.tracks, scene.camera, {}, 1);
+  const auto poses = ResectFrames(starts, {points, scene.tracks}, scene.camera, {}, 1);
   EXPECT_FALSE(poses.contains(lonely));
   EXPECT_FALSE(poses.contains(FrameId{0})) << "not asked for";
   EXPECT_EQ(poses.size(), 6U);

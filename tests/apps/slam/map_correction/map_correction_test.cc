@@ -53,7 +53,10 @@ class CorrectMapsTest : public testing::Test {
   }
 
   std::set<FrameId> Correct() {
-    return CorrectMaps(sources_, walk_.camera, map_.tracks, {}, 0, {}, refined_);
+    sources_.calibrated = walk_.camera;
+    sources_.tracks = map_.tracks;
+    sources_.seed = 0;
+    return CorrectMaps(sources_, {}, {}, refined_);
   }
 
   static Features Blank(FrameId frame) {

@@ -16,7 +16,7 @@ std::vector<RelocalisedMap> RelocaliseIn(const Walk& walk,
                                          const std::vector<Lookalike>& lookalikes,
                                          int num_threads = 1) {
   PlaceMatches places(walk.places, walk.camera);
-  return Relocalise(maps, tracks, places, lookalikes, walk.camera, {}, 0, num_threads);
+  return Relocalise({maps, tracks, lookalikes, walk.camera}, {}, 0, num_threads, places);
 }
 
 void ExpectTruth(const RelocalisedMap& map, const Reconstruction& truth) {

@@ -1,0 +1,131 @@
+#include "apps/cli/run_directory/map_files.h"
+
+#include <algorithm>
+#include <cmath>
+#include <map>
+
+#include "output/map/map_keypoints.h"
+#include "output/map/run_map.h"
+
+namespace rotslam {
+namespace {
+
+constexpr std::uint8_t kUnknownLevel = 255;
+
+// Gives each sighting of `tracks` that is in the map the level of its frame's feature whose
+// keypoint it is to the last bit.
+void FindLevels(const std::map<FrameId, Features>& features,
+                const std::vector<Track>& tracks,
+                RunMap& map) {
+  std::map<FrameId, std::vector<std::pair<TrackId, Eigen::Vector2d>>> sightings;
+  for (const Track& track : tracks) {
+    for (const Observation& seen : track.observations) {
+      sightings[seen.frame].emplace_back(track.id, seen.keypoint_px);
+    }
+  }
+  for (const auto& [frame, of_frame] : sightings) {
+    const auto found = features.find(frame);
+    if (found == features.end()) continue;
+    std::map<std::pair<double, double>, int> level_at;
+    for (int k = 0; k < found->second.size(); ++k) {
+      const Eigen::Vector2d& keypoint_px = found->second.keypoints_px[k];
+      level_at[{keypoint_px.x(), keypoint_px.y()}] = found->second.levels[k];
+    }
+    for (const auto& [id, keypoint_px] : of_frame) {
+      const auto level = level_at.find({keypoint_px.x(), keypoint_px.y()});
+      const auto entry = std::lower_bound(
+          map.tracks.begin(), map.tracks.end(), id, [](const MapTrack& track, TrackId wanted) {
+            return track.track.id < wanted;
+          });
+      if (level == level_at.end() || entry == map.tracks.end() || entry->track.id != id) continue;
+      const std::vector<Observation>& observations = entry->track.observations;
+      for (std::size_t k = 0; k < observations.size(); ++k) {
+        if (observations[k].frame != frame) continue;
+        entry->levels[k] = static_cast<std::uint8_t>(level->second);
+      }
+    }
+  }
+}
+
+// Of sightings that the tracker did not make: as its nearest one shows the point, nearer or
+// farther.
+void GuessUnknownLevels(RunMap& map) {
+  std::map<FrameId, Eigen::Vector3d> centers;
+  for (const MapFrame& frame : map.frames) centers[frame.id] = frame.center_in_world;
+  for (MapTrack& entry : map.tracks) {
+    std::vector<std::size_t> known;
+    for (std::size_t k = 0; k < entry.levels.size(); ++k) {
+      if (entry.levels[k] != kUnknownLevel) known.push_back(k);
+    }
+    const std::vector<Observation>& observations = entry.track.observations;
+    const auto distance = [&](std::size_t k) {
+      return (*entry.point_in_world - centers.at(observations[k].frame)).norm();
+    };
+    const std::vector<std::uint8_t> levels = entry.levels;
+    for (std::size_t k = 0; k < levels.size(); ++k) {
+      if (levels[k] != kUnknownLevel) continue;
+      entry.levels[k] = 0;
+      if (known.empty()) continue;
+      const auto gap = [&](std::size_t other) {
+        return std::abs(observations[other].frame.value - observations[k].frame.value);
+      };
+      const std::size_t nearest =
+          *std::min_element(known.begin(), known.end(), [&](std::size_t a, std::size_t b) {
+            return gap(a) < gap(b);
+          });
+      entry.levels[k] = levels[nearest];
+      if (!entry.point_in_world) continue;
+      const double nearer = std::log(distance(nearest) / distance(k)) / std::log(map.level_scale);
+      entry.levels[k] = static_cast<std::uint8_t>(
+          std::lround(std::clamp(levels[nearest] + nearer, 0.0, map.num_levels - 1.0)));
+    }
+  }
+}
+
+// Joins tracks, and finds the level that shows each sighting.
+// @param tracks  as the tracker made them.
+void SetTracks(const std::map<FrameId, Features>& features,
+               const std::vector<Track>& tracks,
+               std::vector<MapTrack> joined,
+               RunMap& map) {
+  map.tracks = std::move(joined);
+  for (MapTrack& entry : map.tracks) entry.levels.assign(entry.fits.size(), kUnknownLevel);
+  FindLevels(features, tracks, map);
+  GuessUnknownLevels(map);
+}
+
+}  // namespace
+
+void WriteMaps(const std::filesystem::path& directory,
+               const Sequence& sequence,
+               const Orientations& orientations,
+               const MapResult& positions,
+               const FeatureOptions& features) {
+  RunMap map;
+  map.level_scale = features.scale_factor;
+  map.num_levels = features.num_levels;
+  map.camera = positions.camera;
+  map.image_folder = std::filesystem::absolute(sequence.image_folder()).lexically_normal().string();
+  map.is_video = sequence.is_video();
+  for (const auto& [frame, cam_from_world] : positions.cam_from_world) {
+    map.frames.push_back({frame,
+                          orientations.timestamps_s[frame.value],
+                          // Frames of a video have numbers; whoever extracts them adds the ending.
+                          orientations.image_names[frame.value] + (map.is_video ? ".png" : ""),
+                          positions.keyframes.contains(frame),
+                          cam_from_world,
+                          positions.center_in_world.at(frame)});
+  }
+  for (const RelativeRotation& edge : orientations.graph.edges()) {
+    map.edges.push_back({edge.i, edge.j, edge.num_inliers, edge.rotation_only});
+  }
+  SetTracks(orientations.features,
+            positions.keyframe_tracks,
+            JoinTracks(positions.keyframe_tracks, positions.map),
+            map);
+  WriteRunMap(directory / "map.bin", map);
+  SetTracks(orientations.features, positions.cloud.tracks, JoinTracks({}, positions.cloud), map);
+  WriteRunMap(directory / "map_all_frames.bin", map);
+}
+
+}  // namespace rotslam

@@ -1,0 +1,20 @@
+#pragma once
+
+#include <filesystem>
+
+#include "apps/slam/map_result.h"
+#include "apps/slam/orientations.h"
+#include "rotodom/sequence/sequence.h"
+
+namespace rotslam {
+
+/// Writes map.bin, the keyframes' map with all their tracks, and map_all_frames.bin, the cloud as
+/// all frames see it: what `rotslam export` reads.
+/// @param features  with which the orientations were found.
+void WriteMaps(const std::filesystem::path& directory,
+               const Sequence& sequence,
+               const Orientations& orientations,
+               const MapResult& positions,
+               const FeatureOptions& features);
+
+}  // namespace rotslam

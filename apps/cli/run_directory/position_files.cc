@@ -1,0 +1,74 @@
+#include "apps/cli/run_directory/position_files.h"
+
+#include "apps/cli/run_directory/map_segments.h"
+#include "output/export/known_rotation_file.h"
+#include "output/tables/pose_covariance_csv.h"
+#include "output/trajectory/trajectory.h"
+
+namespace rotslam {
+namespace {
+
+// Camera->world poses of all frames of `centers`.
+Trajectory MakeTrajectory(const std::vector<double>& timestamps_s,
+                          const RotationMap& cam_from_world,
+                          const CenterMap& centers) {
+  Trajectory trajectory;
+  for (const auto& [frame, center] : centers) {
+    trajectory.push_back({timestamps_s[frame.value], cam_from_world.at(frame).Inverse(), center});
+  }
+  return trajectory;
+}
+
+}  // namespace
+
+void WritePositions(const std::filesystem::path& directory,
+                    const Orientations& orientations,
+                    const MapResult& positions,
+                    PlyForm form) {
+  const Trajectory trajectory = MakeTrajectory(
+      orientations.timestamps_s, positions.cam_from_world, positions.center_in_world);
+  const std::vector<Segment> segments = SegmentsOf(positions);
+  const std::vector<std::string> comments = CommentsOn(segments);
+  WriteTumTrajectory(directory / "trajectory_tum.txt", trajectory, comments);
+  WriteKittiTrajectory(directory / "trajectory_kitti.txt", trajectory);
+  CenterMap keyframe_centers = positions.center_in_world;
+  std::erase_if(keyframe_centers,
+                [&](const auto& entry) { return !positions.keyframes.contains(entry.first); });
+  WriteTumTrajectory(
+      directory / "keyframes_tum.txt",
+      MakeTrajectory(orientations.timestamps_s, positions.cam_from_world, keyframe_centers),
+      comments);
+  WritePly(directory / "cloud.ply", MakeCloud(positions.cloud, positions.camera), form);
+  std::vector<Frustum> frusta;
+  frusta.reserve(keyframe_centers.size());
+  const double size = FrustumSize(keyframe_centers);
+  for (const auto& [frame, center] : keyframe_centers) {
+    frusta.push_back({positions.cam_from_world.at(frame), center, size});
+  }
+  WriteFrustaPly(directory / "cameras.ply", frusta, positions.camera, form);
+  WriteSegments(directory / "segments.csv", segments);
+  if (positions.pose_covariance.empty()) return;
+  std::vector<PoseCovarianceRow> rows;
+  rows.reserve(positions.pose_covariance.size());
+  for (const auto& [frame, covariance] : positions.pose_covariance) {
+    rows.push_back({frame.value, orientations.timestamps_s[frame.value], covariance});
+  }
+  WritePoseCovarianceCsv(directory / "pose_covariance.csv", rows);
+}
+
+void WriteKnownRotationInput(const std::filesystem::path& directory,
+                             const Orientations& orientations,
+                             const MapResult& positions,
+                             const Camera& camera) {
+  KnownRotationInput input;
+  input.camera = camera;
+  for (const FrameId frame : positions.keyframes) {
+    input.cam_from_world[frame] = orientations.cam_from_world.at(frame);
+    input.timestamp_s[frame] = orientations.timestamps_s[frame.value];
+  }
+  input.sigma_rad = OrientationSigmas(orientations);
+  input.tracks = positions.keyframe_tracks;
+  WriteKnownRotation(directory / "known_rotation.txt", input);
+}
+
+}  // namespace rotslam

@@ -1,0 +1,24 @@
+#pragma once
+
+#include <filesystem>
+
+#include "apps/slam/map_result.h"
+#include "apps/slam/orientations.h"
+#include "output/map/ply.h"
+
+namespace rotslam {
+
+/// Writes trajectory_tum.txt, trajectory_kitti.txt, keyframes_tum.txt, cloud.ply, cameras.ply,
+/// segments.csv and, where there are covariances, pose_covariance.csv.
+void WritePositions(const std::filesystem::path& directory,
+                    const Orientations& orientations,
+                    const MapResult& positions,
+                    PlyForm form);
+
+/// Writes known_rotation.txt: the keyframes' orientations and tracks, which `rotslam solve` reads.
+void WriteKnownRotationInput(const std::filesystem::path& directory,
+                             const Orientations& orientations,
+                             const MapResult& positions,
+                             const Camera& camera);
+
+}  // namespace rotslam

@@ -1,0 +1,28 @@
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include "apps/cli/input/input.h"
+#include "apps/slam/map_result.h"
+#include "apps/slam/orientations.h"
+#include "output/tables/summary.h"
+
+namespace rotslam {
+
+/// The parts of summary.json that `run` and `rotations` share.
+RunSummary StartSummary(const std::string& command,
+                        const Input& input,
+                        const Orientations& orientations,
+                        std::vector<OptionEntry> options);
+
+/// The parts that only `run` has.
+void AddPositions(const MapResult& positions, const Camera& camera, RunSummary& summary);
+
+/// The parts that `run` and `solve` share.
+void AddKnownRotation(const KrotSolution& solution, const Camera& camera, RunSummary& summary);
+void AddBundles(const std::vector<BundleSummary>& bundles,
+                const Camera& camera,
+                RunSummary& summary);
+
+}  // namespace rotslam
