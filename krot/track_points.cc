@@ -61,14 +61,15 @@ std::vector<Track> CleanTracks(const std::vector<Track>& tracks,
 TriangulatedTracks TriangulateAll(const KrotProblem& problem,
                                   const CenterMap& centers,
                                   const std::vector<double>& thresholds) {
-  const auto& [cam_from_world, tracks, options, units] = problem;
+  const std::vector<Track>& tracks = problem.tracks;
+  const KrotUnits& units = problem.units;
   TriangulatedTracks points(tracks.size());
-  ParallelFor(static_cast<int>(tracks.size()), options.num_threads, [&](int t) {
+  ParallelFor(static_cast<int>(tracks.size()), problem.options.num_threads, [&](int t) {
     std::vector<int> observations;
     const std::vector<PosedRay> rays =
-        PosedRays(cam_from_world, centers, tracks[t], units.focal_px, &observations);
-    const auto robust =
-        TriangulateRobustly(rays, units.point_angle_rad, options.loose_factor * thresholds[t]);
+        PosedRays(problem.cam_from_world, centers, tracks[t], units.focal_px, &observations);
+    const auto robust = TriangulateRobustly(
+        rays, units.point_angle_rad, problem.options.loose_factor * thresholds[t]);
     if (!robust) return;
     TriangulatedTrack point{robust->point_in_world, {}};
     std::size_t next = 0;
