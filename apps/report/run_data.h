@@ -52,7 +52,7 @@ struct RunData {
   std::string truth_problem;  // why the ground truth beside the images could not be used
 
   int NumFrames() const { return static_cast<int>(rotations.size()); }
-  /// Whether the run has positions that differ.
+  /// Whether the camera moved: two frames at least have different positions.
   bool HasPositions() const;
 };
 

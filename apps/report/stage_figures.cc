@@ -241,7 +241,7 @@ Drawing ViewGraphFigure(const RunData& run) {
   return drawing;
 }
 
-// What the camera does from each frame to the next; pure rotation is shaded.
+// Rotation and step from each frame to the next. Segments of pure rotation or rest are shaded.
 Drawing MotionFigure(const RunData& run) {
   PlotPoints steps, angles;
   for (int n = 1; n < run.NumFrames(); ++n) {
@@ -313,11 +313,17 @@ PlotPoints Residuals(const RunMap& map) {
   return residuals;
 }
 
-Drawing ResidualsFigure(const PlotPoints& residuals) {
+// The larger component of each residual, px: what the bracket bounds.
+std::vector<double> SizesOf(const PlotPoints& residuals) {
   std::vector<double> sizes;
-  for (const Eigen::Vector2d& residual : residuals)
+  for (const Eigen::Vector2d& residual : residuals) {
     sizes.push_back(residual.lpNorm<Eigen::Infinity>());
-  const double reach = Quantile(sizes, 0.99);
+  }
+  return sizes;
+}
+
+Drawing ResidualsFigure(const PlotPoints& residuals) {
+  const double reach = Quantile(SizesOf(residuals), 0.99);
   PlotPoints shown;
   for (const Eigen::Vector2d& residual : residuals) {
     if (residual.lpNorm<Eigen::Infinity>() <= reach) shown.push_back(residual);
@@ -332,16 +338,13 @@ Drawing ResidualsFigure(const PlotPoints& residuals) {
 
 // The bracket of the least possible largest residual, and the residuals after bundle adjustment.
 Drawing KnownRotationFigure(const PlotPoints& residuals, const std::array<double, 2>& bracket_px) {
-  std::vector<double> sizes;
-  for (const Eigen::Vector2d& residual : residuals)
-    sizes.push_back(residual.lpNorm<Eigen::Infinity>());
   Panel panel = {"residual, px", "share"};
   panel.shaded.push_back(bracket_px);
   Drawing drawing(kPageWidth, PageHeight(panel));
   DrawPanel(
       panel,
       {{"observations below, after bundle adjustment",
-        Distribution(sizes, 1.15 * bracket_px[1]),
+        Distribution(SizesOf(residuals), 1.15 * bracket_px[1]),
         kFirst},
        {"bracket of the largest residual", {{bracket_px[0], 0.0}, {bracket_px[0], 1.0}}, kSecond},
        {"", {{bracket_px[1], 0.0}, {bracket_px[1], 1.0}}, kSecond}},
@@ -424,8 +427,7 @@ std::vector<Figure> MakeStageFigures(const RunData& run) {
   if (readout_s > 0.0) {
     figures.push_back(
         {"rolling_shutter",
-         MotionWithinFrame(
-             run, readout_s, "motion of the image between its first and its last row")});
+         MotionWithinFrame(run, readout_s, "motion of the image during its readout")});
   }
   const double exposure_s = SummaryNumber(run, "rotodom", "exposure_s");
   if (exposure_s > 0.0) {

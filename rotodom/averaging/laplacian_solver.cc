@@ -116,7 +116,6 @@ bool LaplacianSolver::Factorize(std::span<const LaplacianEdge> edges) {
     if (edge_place_[k] >= 0) values[edge_place_[k]] -= weight;
   }
   factor_.factorize(upper_);
-  ++num_factorizations_;
   return factor_.info() == Eigen::Success;
 }
 

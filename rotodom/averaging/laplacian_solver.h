@@ -41,8 +41,6 @@ class LaplacianSolver {
   /// Cost:    a factorisation now and then, and one to some twenty products with the matrix.
   bool Solve(std::span<const LaplacianEdge> edges, double damping, Eigen::VectorXd& x);
 
-  int num_factorizations() const { return num_factorizations_; }
-
  private:
   using Factor =
       Eigen::SimplicialLDLT<Eigen::SparseMatrix<double>, Eigen::Upper, Eigen::NaturalOrdering<int>>;
@@ -62,7 +60,6 @@ class LaplacianSolver {
   bool is_factorized_ = false;
   bool uses_factor_ = false;
   int last_iterations_ = 0;
-  int num_factorizations_ = 0;
   double damping_ = 0.0;
   std::vector<int> position_;        // of a view in the order of elimination
   std::vector<int> diagonal_place_;  // among the values of upper_, by view

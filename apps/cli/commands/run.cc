@@ -52,7 +52,7 @@ void WriteInterrupted(const TrackedInput& tracked, double orientations_s) {
   tracked.outputs.Publish();
 }
 
-// Whether the camera only rotates, and with another lens than the one given.
+// Whether the camera rotates throughout and another lens than the given one explains its images.
 bool RotatesByLens(const MapResult& positions, const Input& input) {
   return positions.rotates_throughout && positions.camera != input.camera;
 }
@@ -74,7 +74,7 @@ RunSummary SummariseRun(const TrackedInput& tracked, const MapResult& positions)
   return summary;
 }
 
-// What the user must know of the result.
+// Warns of scales that are a guess, of a guessed focal length and of a map without positions.
 void Warn(const MapResult& positions,
           const std::vector<Segment>& segments,
           const Input& input,

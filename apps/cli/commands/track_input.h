@@ -23,8 +23,9 @@ struct TrackFlags {
   CheckpointFlags checkpoint;
 };
 
-/// What `run` and `rotations` begin with: opens the input, finds the focal length where the camera
-/// is a guess, and writes the orientations of all frames to the folder of unfinished outputs.
+/// The stage that `run` and `rotations` share. It opens the input, estimates the focal length where
+/// the camera is a guess, finds the orientations of all frames, and writes them to the folder of
+/// unfinished outputs.
 struct TrackedInput {
   /// @param keep_features  for a map.
   /// Throws what FindOrientations throws; InterruptedError where a request to stop came before
@@ -38,7 +39,7 @@ struct TrackedInput {
   Interruption interruption;
   Progress progress;
   RunOptions options;
-  // Its camera gets the focal length and the readout that the images tell.
+  // Its camera holds the focal length and the readout that were estimated from the images.
   Input input;
   std::shared_ptr<const Vocabulary> vocabulary;
   std::filesystem::path directory;

@@ -4,8 +4,8 @@
 
 namespace rotslam {
 
-/// What became of a key that was an option of earlier versions, in one sentence: fixed or called
-/// otherwise. Empty for others.
+/// Says in one sentence whether an option of an earlier version is fixed now or has another name.
+/// Empty for keys that were no options.
 /// @param key  with its groups; "options." in front as in the list of a batch.
 std::string FormerOption(const std::string& key);
 

@@ -47,8 +47,8 @@ void FindLevels(const std::map<FrameId, Features>& features,
   }
 }
 
-// Of sightings that the tracker did not make: as its nearest one shows the point, nearer or
-// farther.
+// Sets the pyramid levels that the tracker did not give: that of the track's observation in the
+// nearest frame, changed by the ratio of both distances to the point.
 void GuessUnknownLevels(RunMap& map) {
   std::map<FrameId, Eigen::Vector3d> centers;
   for (const MapFrame& frame : map.frames) centers[frame.id] = frame.center_in_world;
@@ -82,7 +82,7 @@ void GuessUnknownLevels(RunMap& map) {
   }
 }
 
-// Joins tracks, and finds the level that shows each sighting.
+// Joins tracks, and finds the pyramid level of each observation.
 // @param tracks  as the tracker made them.
 void SetTracks(const std::map<FrameId, Features>& features,
                const std::vector<Track>& tracks,

@@ -7,7 +7,7 @@
 
 namespace rotslam {
 
-/// What every subcommand takes.
+/// The flags of every subcommand.
 struct CommonFlags {
   int threads = 0;  // 0: all cores; the output does not depend on it
   std::uint64_t seed = 1;
