@@ -194,8 +194,11 @@ std::string OptionsAsYaml(const std::vector<OptionRef>& options) {
     const std::string key = n < entries.size() ? entries[n].key : "(none)";
     const std::string explained = n < std::size(kOptionTexts) ? kOptionTexts[n].key : "(none)";
     if (key != explained) {
-      throw std::logic_error("option_texts.cc explains " + explained + " where the option is " +
-                             key);
+      std::string problem = "option_texts.cc explains ";
+      problem += explained;
+      problem += " where the option is ";
+      problem += key;
+      throw std::logic_error(problem);
     }
   }
   // Lines and, for options, their comments.
