@@ -39,7 +39,7 @@ photograph() {  # <run> <picture>: the top of its report
     echo "no chromium: $images/$2.jpg is kept as it is"
     return
   fi
-  sed "s|$PWD/||g" "$work/$1/report.html" >"$work/$2.html"
+  sed "s|$PWD/||g; s|$(realpath -m "$data")/||g" "$work/$1/report.html" >"$work/$2.html"
   chromium --headless --no-sandbox --hide-scrollbars --enable-unsafe-swiftshader --window-size=1360,1300 \
     --virtual-time-budget=20000 --screenshot="$work/$2.png" "file://$PWD/$work/$2.html" >/dev/null 2>&1
   ffmpeg -loglevel error -y -i "$work/$2.png" -vf scale=1000:-2 -q:v 8 "$images/$2.jpg"
