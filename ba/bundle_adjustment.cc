@@ -7,11 +7,11 @@
 #include <numeric>
 #include <utility>
 
-#include "ba/cost/lens.h"
 #include "ba/covariance/camera_covariances.h"
 #include "ba/outliers/classification.h"
 #include "ba/problem/bundle_state.h"
 #include "ba/solver/minimisation.h"
+#include "rotodom/camera/lens_parameters.h"
 #include "rotodom/types/splitmix64.h"
 #include "rotodom/types/stopwatch.h"
 #include "rotodom/types/triangulation.h"
@@ -129,6 +129,7 @@ class Rounds {
     constexpr double kMaxChangedShare = 5e-4;
     if (!good_ || !round.enabled) return;
     last_ = round;
+    if (options_.max_final_rounds == 0) ClassifyAll(round, placement, options_, state);
     for (int k = 0; k < options_.max_final_rounds && good_; ++k) {
       const auto start = std::chrono::steady_clock::now();
       const std::vector<bool> before = UsedFlags(state);
@@ -140,17 +141,22 @@ class Rounds {
       if (k > 0 && static_cast<double>(changed) <= kMaxChangedShare * total) return;
       if (k == 2) round.function_tolerance *= kEasier;
       Minimise("final", round, start, state);
+      // What classification still changes does not move the lens.
+      moves_lens_ = false;
     }
   }
 
   // Lets the lens move on the observations of the round before; keeps that when it gains enough,
   // where that is not clear over the same round without.
-  void TryLens(const BundleRound& round, BundleState& state) {
+  void TryLens(const BundleRound& coarse, BundleState& state) {
+    // A lens and the way that fits it change together over long distances, as in the fine round.
+    BundleRound round = coarse;
+    round.initial_radius = options_.fine.initial_radius;
     // Times the least gain: more than a round leaves to be gained that has come to its end.
     constexpr double kClear = 10.0;
     const LensOptions& lens = options_.lens;
     if (!good_ || !round.enabled) return;
-    if (!lens.refine_focal && !lens.refine_principal_point && !lens.refine_distortion) return;
+    if (!lens.RefinesAny()) return;
     const bool is_at_end = result_.status == BundleStatus::kConverged;
     BundleState without = state;
     const auto minimised = [&](bool refine_lens, BundleState& from) {
@@ -177,33 +183,25 @@ class Rounds {
 
   // Of what the state holds now.
   void FindCovariances(const BundleRound& round, BundleState& state) {
-    if (!options_.find_covariance) return;
+    if (!options_.find_covariance && !(options_.find_lens_covariance && refine_lens_)) return;
     const auto found = rotslam::FindCovariances(calibrated_, round, refine_lens_, options_, state);
     if (!found) return;
     for (std::size_t k = 0; k < state.frames.size(); ++k) {
       if (found->poses[k]) result_.pose_covariance[state.frames[k].id] = *found->poses[k];
     }
-    if (found->lens) result_.summary.lens_sigmas = SigmasOf(*found->lens);
+    if (found->lens_variances) {
+      result_.summary.lens_sigmas = SigmasOf(*found->lens_variances);
+    }
   }
 
   bool good() const { return good_; }
   const BundleRound& last() const { return last_; }
 
  private:
-  LensSigmas SigmasOf(const Eigen::Matrix<double, 6, 6>& covariance) const {
-    const LensParameters sigma = covariance.diagonal().cwiseSqrt();
-    const LensOptions& lens = options_.lens;
-    LensSigmas sigmas;
-    if (lens.refine_focal) sigmas.focal_px = calibrated_.fx * sigma[0];
-    if (lens.refine_principal_point) {
-      sigmas.cx_px = calibrated_.fx * sigma[2];
-      sigmas.cy_px = calibrated_.fy * sigma[3];
-    }
-    if (lens.refine_distortion) {
-      sigmas.k1 = sigma[4];
-      if (NumLensCoefficients(calibrated_.model) > 1) sigmas.k2 = sigma[5];
-    }
-    return sigmas;
+  // Zero for what was held.
+  LensSigmas SigmasOf(const LensParameters& variances) const {
+    const LensParameters priors = options_.lens.Sigmas(calibrated_.model);
+    return SigmasInPixels((priors.array() > 0.0).select(variances.cwiseSqrt(), 0.0), calibrated_);
   }
 
   void Minimise(const std::string& name,
@@ -211,7 +209,7 @@ class Rounds {
                 std::chrono::steady_clock::time_point start,
                 BundleState& state) {
     const std::optional<MinimisationResult> minimised =
-        rotslam::Minimise(calibrated_, round, refine_lens_, options_, state);
+        rotslam::Minimise(calibrated_, round, refine_lens_ && moves_lens_, options_, state);
     good_ = minimised.has_value();
     if (!minimised) {
       result_.status = BundleStatus::kTooLittleData;
@@ -246,6 +244,7 @@ class Rounds {
   BundleResult& result_;
   bool good_ = true;
   bool refine_lens_ = false;
+  bool moves_lens_ = true;  // if it is refined at all
   BundleRound last_;
 };
 

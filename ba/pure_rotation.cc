@@ -37,6 +37,7 @@ PureRotationResult RefinePureRotation(const Camera& camera,
   rotating.fixed_rotation.refine_rotations = true;
   rotating.fixed_rotation.loss = RobustLoss::kCauchy;
   rotating.find_covariance = false;
+  rotating.find_lens_covariance = true;
   // Explanations are compared at the same loss and limit.
   rotating.loss_spreads = 0.0;
   rotating.limit_spreads = 0.0;
@@ -45,12 +46,17 @@ PureRotationResult RefinePureRotation(const Camera& camera,
     lens.refine_focal = true;
     lens.focal_sigma = std::max(lens.focal_sigma, kFocalSigma);
   }
+  if (lens.given_sigmas) {
+    double& sigma = (*lens.given_sigmas)[kLensFocal];
+    sigma = std::max(sigma, kFocalSigma);
+  }
   lens.min_gain = std::max(lens.min_gain, kMinLensGain);
   const BundleResult refined = RefineBundle(problem, rotating);
   result.status = refined.status;
   result.cam_from_world = refined.reconstruction.cam_from_world;
   result.camera = refined.camera;
   result.lens_refined = refined.summary.lens_refined;
+  result.lens_sigmas = refined.summary.lens_sigmas;
   if (refined.summary.rounds.empty()) return result;
   const BundleRoundSummary& last = refined.summary.rounds.back();
   result.num_directions = last.num_directions;

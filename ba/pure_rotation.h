@@ -1,5 +1,6 @@
 #pragma once
 
+#include <optional>
 #include <vector>
 
 #include "ba/bundle_adjustment.h"
@@ -12,6 +13,7 @@ struct PureRotationResult {
   RotationMap cam_from_world;  // of every frame given; the first one stays
   Camera camera;               // with its lens refined, if that gains enough (LensOptions)
   bool lens_refined = false;   // whether it did
+  std::optional<LensSigmas> lens_sigmas;  // of a refined lens, see BundleSummary
   // Tracks, and observations of them, that one direction each explains.
   int num_directions = 0;
   int num_observations = 0;

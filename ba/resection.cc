@@ -209,6 +209,66 @@ std::optional<Matrix6d> Covariance(const Matrix6d& H) {
   return Matrix6d(scale.asDiagonal() * inverse * scale.asDiagonal());
 }
 
+// Throws as ResectFrame does.
+void RefuseBadInputs(const Camera& camera,
+                     const ResectionStart& start,
+                     const ResectionOptions& options) {
+  const auto refuse = [](const std::string& reason) {
+    throw std::invalid_argument("ResectFrame: " + reason);
+  };
+  if (const auto problem = options.Problem()) refuse("option " + *problem);
+  if (const auto problem = camera.Problem()) refuse("camera " + *problem);
+  if (!start.center_in_world.allFinite()) refuse("the start centre is not finite");
+  if (start.rotation_covariance && !(start.rotation_covariance->allFinite() &&
+                                     start.rotation_covariance->llt().info() == Eigen::Success)) {
+    refuse("the rotation covariance is not positive definite");
+  }
+}
+
+std::vector<PointObservation2D3D> FiniteOnes(
+    const std::vector<PointObservation2D3D>& observations) {
+  std::vector<PointObservation2D3D> finite;
+  for (const PointObservation2D3D& observation : observations) {
+    if (observation.point_in_world.allFinite() && observation.keypoint_px.allFinite() &&
+        std::isfinite(observation.sigma_px) && observation.sigma_px > 0.0) {
+      finite.push_back(observation);
+    }
+  }
+  return finite;
+}
+
+// What the observations tell about a pose; nullopt with too few inliers, or when they leave it
+// open.
+std::optional<ResectedPose> Describe(const Pose& pose,
+                                     const Resection& resection,
+                                     const std::vector<PointObservation2D3D>& finite,
+                                     const ResectionOptions& options) {
+  ResectedPose result;
+  result.cam_from_world = pose.cam_from_world;
+  result.center_in_world = pose.center_in_world;
+  double squares = 0.0;
+  double squares_in_sigmas = 0.0;
+  for (const PointObservation2D3D& observation : finite) {
+    if (!resection.IsInlier(pose, observation)) continue;
+    ++result.num_inliers;
+    const double sigmas = resection.Sigmas(pose, observation);
+    squares_in_sigmas += sigmas * sigmas;
+    const double error_px = sigmas * observation.sigma_px;
+    squares += error_px * error_px;
+  }
+  if (result.num_inliers < options.min_inliers) return std::nullopt;
+  result.rms_px = std::sqrt(squares / result.num_inliers);
+  const int num_unknowns = (options.refine_rotation ? 3 : 0) + (options.refine_center ? 3 : 0);
+  const int freedom = std::max(1, 2 * result.num_inliers - num_unknowns);
+  result.variance_factor = squares_in_sigmas / freedom;
+  const std::optional<Matrix6d> covariance = Covariance(resection.Evaluate(pose, 0.0).H);
+  if (!covariance) return std::nullopt;
+  result.covariance = *covariance;
+  if (!options.refine_rotation) result.covariance.topLeftCorner<3, 3>().setZero();
+  if (!options.refine_center) result.covariance.bottomRightCorner<3, 3>().setZero();
+  return result;
+}
+
 }  // namespace
 
 std::optional<std::string> ResectionOptions::Problem() const {
@@ -226,24 +286,8 @@ std::optional<ResectedPose> ResectFrame(const Camera& camera,
                                         const std::vector<PointObservation2D3D>& observations,
                                         const ResectionStart& start,
                                         const ResectionOptions& options) {
-  const auto refuse = [](const std::string& reason) {
-    throw std::invalid_argument("ResectFrame: " + reason);
-  };
-  if (const auto problem = options.Problem()) refuse("option " + *problem);
-  if (const auto problem = camera.Problem()) refuse("camera " + *problem);
-  if (!start.center_in_world.allFinite()) refuse("the start centre is not finite");
-  if (start.rotation_covariance && !(start.rotation_covariance->allFinite() &&
-                                     start.rotation_covariance->llt().info() == Eigen::Success)) {
-    refuse("the rotation covariance is not positive definite");
-  }
-
-  std::vector<PointObservation2D3D> finite;
-  for (const PointObservation2D3D& observation : observations) {
-    if (observation.point_in_world.allFinite() && observation.keypoint_px.allFinite() &&
-        std::isfinite(observation.sigma_px) && observation.sigma_px > 0.0) {
-      finite.push_back(observation);
-    }
-  }
+  RefuseBadInputs(camera, start, options);
+  const std::vector<PointObservation2D3D> finite = FiniteOnes(observations);
   if (static_cast<int>(finite.size()) < options.min_inliers) return std::nullopt;
 
   Resection resection(camera, finite, start, options);
@@ -263,24 +307,18 @@ std::optional<ResectedPose> ResectFrame(const Camera& camera,
     }
   }
 
-  ResectedPose result;
-  result.cam_from_world = pose.cam_from_world;
-  result.center_in_world = pose.center_in_world;
-  double squares = 0.0;
-  for (const PointObservation2D3D& observation : finite) {
-    if (!resection.IsInlier(pose, observation)) continue;
-    ++result.num_inliers;
-    const double error_px = resection.Sigmas(pose, observation) * observation.sigma_px;
-    squares += error_px * error_px;
-  }
-  if (result.num_inliers < options.min_inliers) return std::nullopt;
-  result.rms_px = std::sqrt(squares / result.num_inliers);
-  const std::optional<Matrix6d> covariance = Covariance(resection.Evaluate(pose, 0.0).H);
-  if (!covariance) return std::nullopt;
-  result.covariance = *covariance;
-  if (!options.refine_rotation) result.covariance.topLeftCorner<3, 3>().setZero();
-  if (!options.refine_center) result.covariance.bottomRightCorner<3, 3>().setZero();
-  return result;
+  return Describe(pose, resection, finite, options);
+}
+
+std::optional<ResectedPose> AssessPose(const Camera& camera,
+                                       const std::vector<PointObservation2D3D>& observations,
+                                       const ResectionStart& start,
+                                       const ResectionOptions& options) {
+  RefuseBadInputs(camera, start, options);
+  const std::vector<PointObservation2D3D> finite = FiniteOnes(observations);
+  Resection resection(camera, finite, start, options);
+  resection.ForgetRotation();
+  return Describe({start.cam_from_world, start.center_in_world}, resection, finite, options);
 }
 
 }  // namespace rotslam

@@ -65,6 +65,9 @@ struct ResectedPose {
   Eigen::Vector3d center_in_world = Eigen::Vector3d::Zero();
   int num_inliers = 0;
   double rms_px = 0.0;  // of the inliers
+  // Sum of the inliers' squared residuals, in sigmas, over the degrees of freedom: what their
+  // sigmas' squares would have to be multiplied by.
+  double variance_factor = 1.0;
   /// Of (delta, centre): delta in rad as in Exp(delta) * cam_from_world, centre in world units;
   /// from the inliers' sigmas and the rotation's own covariance where given. Zero for what was
   /// held.
@@ -77,14 +80,22 @@ struct ResectedPose {
 /// @return  nullopt with too few inliers, or when they leave the pose open or did not settle.
 /// Throws std::invalid_argument for bad options, camera or start.
 /// Error:   truth to 1e-9 of the distance to the points on clean observations; with 30 % outliers
-/// as good as without them (ba tests). Cost:    about 30 passes over the observations, some more
-/// where the rotation is a measurement; one
-///          or two milliseconds for 1,000.
+///          as good as without them (ba tests).
+/// Cost:    about 30 passes over the observations, some more where the rotation is a measurement;
+///          one or two milliseconds for 1,000.
 /// Source:  iteratively reweighted least squares with a falling scale, as in Barron, A General and
 ///          Adaptive Robust Loss Function, CVPR 2019, sec. 3; ours is Levenberg-Marquardt inside.
 std::optional<ResectedPose> ResectFrame(const Camera& camera,
                                         const std::vector<PointObservation2D3D>& observations,
                                         const ResectionStart& start,
                                         const ResectionOptions& options);
+
+/// The same of a pose that is known and stays: the start's, its rotation no measurement. What the
+/// options let move has a covariance.
+/// Cost:    one pass over the observations.
+std::optional<ResectedPose> AssessPose(const Camera& camera,
+                                       const std::vector<PointObservation2D3D>& observations,
+                                       const ResectionStart& start,
+                                       const ResectionOptions& options);
 
 }  // namespace rotslam

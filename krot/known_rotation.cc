@@ -116,10 +116,21 @@ KeptProblem TakeKept(const RotationMap& cam_from_world,
   return kept;
 }
 
+// Where a structure's points come to lie.
+struct Placing {
+  double scale = 0.0;  // 0: nothing was taken
+  Eigen::Vector3d from = Eigen::Vector3d::Zero();
+  Eigen::Vector3d to = Eigen::Vector3d::Zero();
+
+  Eigen::Vector3d operator()(const Eigen::Vector3d& position) const {
+    return to + scale * (position - from);
+  }
+};
+
 // `centers` replaced by `better` where there are such, moved and scaled to lie on them best.
-void TakeCenters(const std::vector<FrameId>& views,
-                 const std::vector<Eigen::Vector3d>& better,
-                 CenterMap& centers) {
+Placing TakeCenters(const std::vector<FrameId>& views,
+                    const std::vector<Eigen::Vector3d>& better,
+                    CenterMap& centers) {
   Eigen::Vector3d mean_from = Eigen::Vector3d::Zero();
   Eigen::Vector3d mean_to = Eigen::Vector3d::Zero();
   for (std::size_t k = 0; k < views.size(); ++k) {
@@ -132,18 +143,40 @@ void TakeCenters(const std::vector<FrameId>& views,
     common += (better[k] - mean_from).dot(centers.at(views[k]) - mean_to);
     squared += (better[k] - mean_from).squaredNorm();
   }
-  if (!(common > 0.0 && squared > 0.0)) return;
-  for (std::size_t k = 0; k < views.size(); ++k) {
-    centers[views[k]] = mean_to + common / squared * (better[k] - mean_from);
+  if (!(common > 0.0 && squared > 0.0)) return {};
+  Placing placing{common / squared, mean_from, mean_to};
+  for (std::size_t k = 0; k < views.size(); ++k) centers[views[k]] = placing(better[k]);
+  return placing;
+}
+
+// The points of a structure, and those of the other tracks triangulated anew.
+void TakePoints(const KrotProblem& problem,
+                const std::vector<double>& thresholds,
+                const NamedProblem& named,
+                const MinimaxStructure& structure,
+                const Placing& placing,
+                const CenterMap& centers,
+                TriangulatedTracks& points) {
+  std::map<TrackId, std::size_t> place;
+  for (std::size_t k = 0; k < named.tracks.size(); ++k) place[named.tracks[k]] = k;
+  TriangulatedTracks anew = TriangulateAll(problem, centers, thresholds);
+  for (std::size_t t = 0; t < points.size(); ++t) {
+    const auto found = place.find(problem.tracks[t].id);
+    if (found == place.end()) {
+      points[t] = std::move(anew[t]);
+    } else {
+      points[t]->point_in_world = placing(structure.point_in_world[found->second]);
+    }
   }
 }
 
 // Enters what a component's observations say about the least possible largest residual; the best
-// structure's centres become the component's where they are asked for. Returns how the search
-// ended.
+// structure's centres and points become the component's where they are asked for. Returns how the
+// search ended.
 BisectionStatus BoundResidual(const KrotProblem& problem,
-                              const TriangulatedTracks& points,
+                              const std::vector<double>& thresholds,
                               CenterMap& centers,
+                              TriangulatedTracks& points,
                               KrotSolution& solution) {
   const auto& [cam_from_world, tracks, options, units] = problem;
   const KeptProblem kept = TakeKept(cam_from_world, centers, tracks, points, units.min_z);
@@ -155,7 +188,11 @@ BisectionStatus BoundResidual(const KrotProblem& problem,
   if (options.use_bracket && (decides || minimax.num_views() <= options.max_bracket_views)) {
     bracket = MinimiseMaxResidual(minimax, options.bisection, &kept.structure);
     if (decides && bracket.gamma_high < kInfinity) {
-      TakeCenters(kept.named.views, bracket.structure.center_in_world, centers);
+      const Placing placing =
+          TakeCenters(kept.named.views, bracket.structure.center_in_world, centers);
+      if (placing.scale > 0.0) {
+        TakePoints(problem, thresholds, kept.named, bracket.structure, placing, centers, points);
+      }
     }
   }
   if (solution.gamma_high == kInfinity || bracket.gamma_high > solution.gamma_high) {
@@ -234,10 +271,7 @@ std::optional<BisectionStatus> SolveComponent(const KrotProblem& problem,
   solution.num_programs += start->num_programs;
   solution.num_grown_views += start->num_grown_views;
   TriangulatedTracks points = TriangulateAll(problem, centers, thresholds);
-  const BisectionStatus bracket = BoundResidual(problem, points, centers, solution);
-  if (problem.options.start == KrotStart::kBisection) {
-    points = TriangulateAll(problem, centers, thresholds);
-  }
+  const BisectionStatus bracket = BoundResidual(problem, thresholds, centers, points, solution);
   Normalise(centers, problem.tracks, points);
   const std::set<FrameId> members(component.views.begin(), component.views.end());
   EnterComponent(problem.tracks, centers, points, members, solution);
@@ -305,6 +339,45 @@ std::optional<std::string> LacksParallax(const KrotProblem& problem) {
   if (num_moving >= kMinSharedPoints) return std::nullopt;
   return "no parallax: " + std::to_string(num_moving) + " of " + std::to_string(num_usable) +
          " tracks move beyond what rotation explains";
+}
+
+// Where the rotations are those of other axes or inverted, positions are found that a small part of
+// the observations allows.
+void FindContradiction(const KrotProblem& problem,
+                       const std::vector<Track>& tracks,
+                       KrotSolution& solution) {
+  constexpr double kMaxContradictingShare = 0.5;
+  // Tracks with less parallax than this many times what a point needs may have none.
+  constexpr double kClearParallax = 2.0;
+  if (!solution.Usable()) return;
+  std::set<std::pair<TrackId, FrameId>> removed;
+  for (const RemovedObservation& one : solution.removed) removed.insert({one.track, one.frame});
+  std::size_t num_all = 0;
+  std::size_t num_contradicting = 0;
+  for (const Track& track : RestrictTracks(
+           tracks,
+           [&](const Observation& observation) {
+             return solution.center_in_world.contains(observation.frame) &&
+                    observation.bearing.allFinite();
+           },
+           2)) {
+    if (TrackParallax(problem.cam_from_world, track) <
+        kClearParallax * problem.units.point_angle_rad) {
+      continue;
+    }
+    const bool has_point = solution.point_in_world.contains(track.id);
+    for (const Observation& observation : track.observations) {
+      ++num_all;
+      num_contradicting += !has_point || removed.contains({track.id, observation.frame}) ? 1 : 0;
+    }
+  }
+  if (static_cast<double>(num_contradicting) <=
+      kMaxContradictingShare * static_cast<double>(num_all)) {
+    return;
+  }
+  solution.status = KrotStatus::kContradiction;
+  solution.message += "; " + std::to_string(num_contradicting) + " of " + std::to_string(num_all) +
+                      " observations with parallax contradict the rotations";
 }
 
 // Solves the components one after the other, and those that come apart from them.
@@ -380,7 +453,9 @@ KrotSolution SolveKnownRotation(const RotationMap& cam_from_world,
     component_options.noise_rad =
         RemoveEpipolarOutliers(cam_from_world, options, units, tracks, solution);
   }
-  Solve({cam_from_world, tracks, options, units}, thresholds, component_options, solution);
+  const KrotProblem problem{cam_from_world, tracks, options, units};
+  Solve(problem, thresholds, component_options, solution);
+  FindContradiction(problem, input, solution);
   std::sort(solution.removed.begin(),
             solution.removed.end(),
             [](const RemovedObservation& a, const RemovedObservation& b) {

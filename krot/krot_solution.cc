@@ -12,6 +12,8 @@ std::string ToString(KrotStatus status) {
       return "iteration_limit";
     case KrotStatus::kCancelled:
       return "cancelled";
+    case KrotStatus::kContradiction:
+      return "contradiction";
     case KrotStatus::kInfeasible:
       return "infeasible";
     case KrotStatus::kSolverFailed:

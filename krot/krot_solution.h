@@ -15,6 +15,7 @@ enum class KrotStatus {
   kConverged,       // positions found, brackets as narrow as asked
   kIterationLimit,  // positions found; a bracket stayed wider than asked, or was not asked for
   kCancelled,       // positions found; bisection.on_progress ended the search for the bracket
+  kContradiction,   // positions found, but most observations contradict the rotations
   kInfeasible,      // the tracks do not determine positions: none, or no parallax
   kSolverFailed,    // the linear programs gave no structure
 };

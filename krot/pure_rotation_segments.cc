@@ -107,6 +107,7 @@ class Search {
   }
 
   double EvidenceOf(const Run& run) const {
+    if (run.first == run.last) return 0.0;
     double sum = 0.0;
     for (int n = run.first + 1; n <= run.last; ++n) sum += step_ratio_[n];
     return sum / (run.last - run.first);
@@ -219,37 +220,71 @@ std::optional<std::string> PureRotationOptions::Problem() const {
   return std::nullopt;
 }
 
-std::vector<PureRotationSegment> FindPureRotationSegments(const ViewGraph& graph,
-                                                          const RotationMap& cam_from_world,
-                                                          const PureRotationOptions& options) {
-  if (const auto problem = options.Problem())
-    throw std::invalid_argument("PureRotationOptions: " + *problem);
-  if (!options.enabled || cam_from_world.empty()) return {};
+namespace {
+
+// The frames in order and their edges.
+struct OrderedEdges {
   std::vector<FrameId> frames;
+  std::vector<Edge> edges;
+};
+
+OrderedEdges OrderedEdgesOf(const ViewGraph& graph, const RotationMap& cam_from_world) {
+  OrderedEdges ordered;
   std::map<FrameId, int> position;
   for (const auto& [frame, rotation] : cam_from_world) {
-    position[frame] = static_cast<int>(frames.size());
-    frames.push_back(frame);
+    position[frame] = static_cast<int>(ordered.frames.size());
+    ordered.frames.push_back(frame);
   }
-  std::vector<Edge> edges;
-  edges.reserve(graph.edges().size());
+  ordered.edges.reserve(graph.edges().size());
   for (const RelativeRotation& edge : graph.edges()) {
     if (!position.contains(edge.i) || !position.contains(edge.j)) {
       throw std::invalid_argument(
           "FindPureRotationSegments: an edge names a frame without orientation");
     }
-    edges.push_back({position.at(edge.i), position.at(edge.j), &edge});
+    ordered.edges.push_back({position.at(edge.i), position.at(edge.j), &edge});
   }
-  const Search search(static_cast<int>(frames.size()), std::move(edges), options);
-  std::vector<PureRotationSegment> stretches;
+  return ordered;
+}
+
+void RequireValid(const PureRotationOptions& options) {
+  if (const auto problem = options.Problem())
+    throw std::invalid_argument("PureRotationOptions: " + *problem);
+}
+
+PureRotationSegment SegmentOf(const Run& run,
+                              const std::vector<FrameId>& frames,
+                              const Search& search) {
+  PureRotationSegment segment = {frames[run.first], frames[run.last], search.EvidenceOf(run), {}};
+  for (const Run& still : search.StillRuns(run)) {
+    segment.still.push_back({frames[still.first], frames[still.last]});
+  }
+  return segment;
+}
+
+}  // namespace
+
+std::vector<PureRotationSegment> FindPureRotationSegments(const ViewGraph& graph,
+                                                          const RotationMap& cam_from_world,
+                                                          const PureRotationOptions& options) {
+  RequireValid(options);
+  if (!options.enabled || cam_from_world.empty()) return {};
+  OrderedEdges ordered = OrderedEdgesOf(graph, cam_from_world);
+  const Search search(static_cast<int>(ordered.frames.size()), std::move(ordered.edges), options);
+  std::vector<PureRotationSegment> segments;
   for (const Run& run : search.FindRuns()) {
-    PureRotationSegment& stretch = stretches.emplace_back();
-    stretch = {frames[run.first], frames[run.last], search.EvidenceOf(run), {}};
-    for (const Run& still : search.StillRuns(run)) {
-      stretch.still.push_back({frames[still.first], frames[still.last]});
-    }
+    segments.push_back(SegmentOf(run, ordered.frames, search));
   }
-  return stretches;
+  return segments;
+}
+
+PureRotationSegment AllFramesAsSegment(const ViewGraph& graph,
+                                       const RotationMap& cam_from_world,
+                                       const PureRotationOptions& options) {
+  RequireValid(options);
+  OrderedEdges ordered = OrderedEdgesOf(graph, cam_from_world);
+  const int num_frames = static_cast<int>(ordered.frames.size());
+  const Search search(num_frames, std::move(ordered.edges), options);
+  return SegmentOf({0, num_frames - 1}, ordered.frames, search);
 }
 
 }  // namespace rotslam

@@ -54,4 +54,11 @@ std::vector<PureRotationSegment> FindPureRotationSegments(const ViewGraph& graph
                                                           const RotationMap& cam_from_world,
                                                           const PureRotationOptions& options);
 
+/// All frames as one segment, whatever their edges say of a baseline, with the parts in which the
+/// camera does not rotate either: for a camera that moves too little for positions.
+/// @param cam_from_world  names the frames, in order; at least one.
+PureRotationSegment AllFramesAsSegment(const ViewGraph& graph,
+                                       const RotationMap& cam_from_world,
+                                       const PureRotationOptions& options);
+
 }  // namespace rotslam

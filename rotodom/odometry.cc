@@ -102,7 +102,8 @@ void RotationalOdometry::CheckNext(FrameId frame, double timestamp_s, const cv::
 
 FrameEstimate RotationalOdometry::AddFrame(FrameId frame,
                                            double timestamp_s,
-                                           const cv::Mat& image) {
+                                           const MaskedImage& masked) {
+  const cv::Mat& image = masked.image;
   CheckNext(frame, timestamp_s, image);
   FrameEstimate estimate;
   estimate.frame = frame;
@@ -121,7 +122,7 @@ FrameEstimate RotationalOdometry::AddFrame(FrameId frame,
   const auto view = std::make_shared<View>();
   view->timestamp_s = timestamp_s;
   view->features.frame = frame;
-  view->pyramid = BuildPyramidOf(image);
+  view->pyramid = BuildPyramidOf(masked);
 
   const std::vector<OrientedView> recent = RecentViews();
   const TrackingTarget target{&view->pyramid,
@@ -138,7 +139,10 @@ FrameEstimate RotationalOdometry::AddFrame(FrameId frame,
 
   cam_from_world_[frame] = tracked.cam_from_world;
   timestamps_s_[frame] = timestamp_s;
-  if (camera_.readout_s > 0.0) CorrectRollingShutters(*view, estimate);
+  if (camera_.readout_s > 0.0) {
+    view->seen_bearings = view->features.bearings;
+    CorrectRollingShutters(*view, estimate);
+  }
   Connect(*view, estimate);
   MarkLostPoints(estimate.connections, *view);
   KeepGoodEdges(estimate);
@@ -154,9 +158,9 @@ FrameEstimate RotationalOdometry::AddFrame(FrameId frame,
   return estimate;
 }
 
-ImagePyramid RotationalOdometry::BuildPyramidOf(const cv::Mat& image) {
+ImagePyramid RotationalOdometry::BuildPyramidOf(const MaskedImage& image) {
   const Stopwatch stopwatch(seconds_.pyramid);
-  return BuildPyramid(ToGrey(image), options_.features);
+  return BuildPyramid(ToGrey(image.image), options_.features, image.mask);
 }
 
 Rotation RotationalOdometry::PredictOrientation(double timestamp_s) const {
@@ -304,7 +308,7 @@ void RotationalOdometry::CorrectRollingShutterOf(View& view,
   const MotionEstimate believed =
       EstimateMotionAt(view.features.frame, cam_from_world_, time_s, camera_.readout_s);
   view.features.shared_error_px = believed.TypicalErrorRad() * camera_.MeanFocal();
-  CorrectRollingShutter(camera_, believed.motion, others, view);
+  CorrectRollingShutter(camera_, believed.motion, others, num_threads_, view);
 }
 
 void RotationalOdometry::CorrectRollingShutters(View& view, FrameEstimate& estimate) {
@@ -330,8 +334,7 @@ void RotationalOdometry::CorrectRollingShutters(View& view, FrameEstimate& estim
   }
   for (int k = num_revised - 1; k >= 0; --k) {
     const Features& revised = at(k)->features;
-    for (const EdgeWithMatches& connection :
-         MeasureEdges(revised, PartnersInGraph(revised.frame))) {
+    for (const EdgeWithMatches& connection : MeasureEdgesAgain(revised)) {
       if (!IsBelieved(connection)) continue;
       graph_.AddEdge(connection.edge);
       estimate.revised_edges.push_back(connection.edge);
@@ -339,35 +342,37 @@ void RotationalOdometry::CorrectRollingShutters(View& view, FrameEstimate& estim
   }
 }
 
-std::vector<const Features*> RotationalOdometry::PartnersInGraph(FrameId frame) const {
+std::vector<EdgeWithMatches> RotationalOdometry::MeasureEdgesAgain(const Features& view) const {
   std::vector<const Features*> partners;
-  for (const int index : graph_.EdgesOf(frame)) {
-    const FrameId other = graph_.edges()[index].i;
-    if (other == frame) continue;
+  std::vector<RelativeRotation> known;
+  for (const int index : graph_.EdgesOf(view.frame)) {
+    const RelativeRotation& edge = graph_.edges()[index];
+    if (edge.i == view.frame) continue;
     for (const auto* views : {&recent_, &keyframes_}) {
       const auto partner = std::find_if(views->begin(), views->end(), [&](const auto& candidate) {
-        return candidate->features.frame == other;
+        return candidate->features.frame == edge.i;
       });
       if (partner == views->end()) continue;
       partners.push_back(&(*partner)->features);
+      known.push_back(edge);
       break;
     }
   }
-  return partners;
+  return UpdateEdges(view,
+                     partners,
+                     known,
+                     cam_from_world_,
+                     camera_.MeanFocal(),
+                     {options_.relative_rotation, seed_, num_threads_});
 }
 
 void RotationalOdometry::Connect(const View& view, FrameEstimate& estimate) {
   const Stopwatch stopwatch(seconds_.edges);
-  estimate.connections = MeasureEdges(view.features, Partners(view));
-}
-
-std::vector<EdgeWithMatches> RotationalOdometry::MeasureEdges(
-    const Features& view, const std::vector<const Features*>& partners) const {
-  return EstimateEdges(view,
-                       partners,
-                       cam_from_world_,
-                       camera_.MeanFocal(),
-                       {options_.relative_rotation, seed_, num_threads_});
+  estimate.connections = EstimateEdges(view.features,
+                                       Partners(view),
+                                       cam_from_world_,
+                                       camera_.MeanFocal(),
+                                       {options_.relative_rotation, seed_, num_threads_});
 }
 
 std::vector<const Features*> RotationalOdometry::Partners(const View& view) const {
@@ -565,6 +570,7 @@ void RotationalOdometry::UpdateKeyframes(std::shared_ptr<View> view) {
     if (is_connected(*recent_.front())) {
       // Of a keyframe only the features are asked for.
       recent_.back()->pyramid = {};
+      recent_.back()->seen_bearings = {};
       recent_.pop_back();
     } else {
       recent_.pop_front();

@@ -98,8 +98,8 @@ class RotationalOdometry {
 
   /// Takes the next frame; frame ids and timestamps must ascend. An empty image gets the predicted
   /// orientation and no edge.
-  /// @param image  8-bit, one or three channels (BGR), of the camera's size.
-  FrameEstimate AddFrame(FrameId frame, double timestamp_s, const cv::Mat& image);
+  /// @param image  of the camera's size; its masked parts are ignored.
+  FrameEstimate AddFrame(FrameId frame, double timestamp_s, const MaskedImage& image);
 
   /// All that later frames depend on, as bytes for RestoreState(). Some megabytes: the grey images
   /// of the newest views are in it.
@@ -125,7 +125,7 @@ class RotationalOdometry {
  private:
   // Throws std::invalid_argument where the frame cannot follow those before.
   void CheckNext(FrameId frame, double timestamp_s, const cv::Mat& image) const;
-  ImagePyramid BuildPyramidOf(const cv::Mat& image);
+  ImagePyramid BuildPyramidOf(const MaskedImage& image);
   Rotation PredictOrientation(double timestamp_s) const;
   // Of a frame after all others, at the mean rate since the one before. Drawing that out to the
   // frame itself by the last change measured worse: accelerations of hand-held cameras do not last.
@@ -150,12 +150,10 @@ class RotationalOdometry {
   void CorrectRollingShutterOf(View& view, const std::vector<const View*>& others) const;
   // Of the present view, and once more of those before it, whose edges are measured again.
   void CorrectRollingShutters(View& view, FrameEstimate& estimate);
-  // Older views that edges lead to, as far as they are remembered.
-  std::vector<const Features*> PartnersInGraph(FrameId frame) const;
+  // Measures the edges to older views again, as far as these are remembered.
+  std::vector<EdgeWithMatches> MeasureEdgesAgain(const Features& view) const;
   void Connect(const View& view, FrameEstimate& estimate);
   std::vector<const Features*> Partners(const View& view) const;
-  std::vector<EdgeWithMatches> MeasureEdges(const Features& view,
-                                            const std::vector<const Features*>& partners) const;
   void KeepGoodEdges(FrameEstimate& estimate) const;
   void AverageWindow(FrameEstimate& estimate);
   void UpdateCovariance(FrameEstimate& estimate);

@@ -20,8 +20,8 @@ packages=(
   libcli11-dev libexif-dev libpcl-dev libspdlog-dev libsqlite3-dev
   # Python module; numpy also for the independent check of `rotslam eval`
   pybind11-dev python3-dev python3-numpy
-  # the report and the plots
-  libcairo2-dev libjs-three
+  # the report and the plots; the page of a live session
+  libcairo2-dev libjs-three libcpp-httplib-dev
   # tests; GLPK and OpenGV to compare with
   libglpk-dev libgmock-dev libgtest-dev libopengv-dev
 )

@@ -37,7 +37,8 @@ class ListReader {
                               &entry.rotations,
                               &entry.vocabulary,
                               &entry.config}) {
-      *file = FromList(*file);
+      const bool is_estimated = file == &entry.camera && entry.camera == "none";
+      if (!is_estimated) *file = FromList(*file);
     }
     Check(node, entry);
     return entry;
@@ -72,6 +73,9 @@ class ListReader {
     }
     if (entry.command == "rotations" && !entry.rotations.empty()) {
       Refuse(node, "\"rotations\" goes with `command: run` only");
+    }
+    if (entry.align && entry.rotations.empty()) {
+      Refuse(node, "\"align\" goes with \"rotations\" only");
     }
   }
 

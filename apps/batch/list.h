@@ -13,10 +13,11 @@ struct BatchEntry {
   std::string name;             // of its folder below --out
   std::string path;             // what `rotslam run` takes
   std::string command = "run";  // or "rotations"
-  std::string camera;
+  std::string camera;           // or "none": the lens is estimated
   std::string ground_truth;
   std::string times;  // timestamps of a KITTI ground truth
   std::string rotations;
+  bool align = false;  // as --align of run
   std::string vocabulary;
   std::string config;  // YAML file that overrides option defaults
   // The defaults, overridden by `config` and then by the list itself.
@@ -31,6 +32,7 @@ struct BatchEntry {
     visit("ground_truth", ground_truth);
     visit("times", times);
     visit("rotations", rotations);
+    visit("align", align);
     visit("vocabulary", vocabulary);
     visit("config", config);
     visit("options", options);
@@ -41,10 +43,12 @@ struct BatchEntry {
 ///   - path: kitti/sequences/00         # folder or video; the one key that must be there
 ///     name: kitti00                    # a-z, A-Z, 0-9, . _ -; left out: the last part of path
 ///     command: rotations               # left out: run
-///     camera: calib.txt                # left out: the calibration that lies with the images
+///     camera: calib.txt                # left out: the calibration that lies with the images;
+///                                      # none: as --camera none
 ///     ground_truth: kitti/poses/00.txt # left out: what lies with the images
 ///     times: kitti/00/times.txt        # timestamps of a KITTI ground truth
 ///     rotations: gimbal.csv            # as --rotations; only for run
+///     align: true                      # as --align; only with rotations
 ///     vocabulary: ORBvoc.txt           # as --vocabulary
 ///     config: config/kitti.yaml        # left out: `config`
 ///     options: {loop: {use_loops: false}, sequence: {stride: 2}}   # over those of config

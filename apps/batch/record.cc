@@ -22,6 +22,7 @@ using Json = nlohmann::ordered_json;
 
 constexpr const char* kRecordFile = "batch.json";
 constexpr const char* kReportFile = "report.html";
+constexpr const char* kLogFile = "log.txt";
 
 // The place of a dotted key, made on the way where it does not exist.
 Json& At(Json& object, const std::string& key) {
@@ -90,6 +91,7 @@ std::string RequestOf(const BatchEntry& entry, std::uint64_t seed) {
                {"path", entry.path},
                {"camera", entry.camera},
                {"rotations", entry.rotations},
+               {"align", entry.align},
                {"vocabulary", entry.vocabulary},
                {"seed", seed},
                {"options", OptionsOf(entry)}})
@@ -106,6 +108,8 @@ std::optional<BatchRecord> ReadRecord(const fs::path& directory) {
   try {
     BatchRecord record;
     record.request = json->at("request").dump();
+    record.earlier_cpu_s = json->value("earlier_cpu_s", 0.0);
+    record.earlier_wall_s = json->value("earlier_wall_s", 0.0);
     if (json->at("exit_code").is_null()) return record;
     const auto exit_code = Integer(json->at("exit_code"));
     const auto max_memory_kb = Integer(json->at("max_memory_kb"));
@@ -129,6 +133,10 @@ void WriteRecord(const fs::path& directory, const BatchRecord& record) {
             {"cpu_s", record.end->cpu_s},
             {"wall_s", record.end->wall_s},
             {"max_memory_kb", record.end->max_memory_kb}};
+  }
+  if (record.earlier_wall_s > 0.0) {
+    json["earlier_cpu_s"] = record.earlier_cpu_s;
+    json["earlier_wall_s"] = record.earlier_wall_s;
   }
   json["request"] = Json::parse(record.request);
   // A child may print any bytes.
@@ -179,6 +187,7 @@ BatchResult ResultOf(const BatchEntry& entry,
                      int num_threads) {
   BatchResult result;
   result.name = entry.name;
+  if (fs::exists(directory / kLogFile)) result.log = entry.name + "/" + kLogFile;
   const std::optional<BatchRecord> record = ReadRecord(directory);
   if (!record) {
     result.status = "not run";

@@ -24,6 +24,9 @@ struct BatchRecord {
   // nullopt: started, and nobody was there to see the end.
   std::optional<ChildEnd> end;
   std::string error;  // the line that says why it failed
+  // Time of the parts before interruptions. The total in `end` includes it.
+  double earlier_cpu_s = 0.0;
+  double earlier_wall_s = 0.0;
 };
 
 /// nullopt where there is no record, or not a whole one.
@@ -59,6 +62,7 @@ struct BatchResult {
   std::string status;
   std::string note;    // why it failed, or could not be compared
   std::string report;  // page about the run, relative to --out; empty: there is none
+  std::string log;     // what it printed, likewise
 };
 
 /// Reads what a run has left in `directory` and compares it with the entry's ground truth.

@@ -24,8 +24,10 @@ std::string SlurmScript(const SlurmJob& job) {
       "#SBATCH --array=1-" +
       std::to_string(job.num_sequences) +
       (job.max_running > 0 ? "%" + std::to_string(job.max_running) : "") +
-      "\n#SBATCH --cpus-per-task=" + threads +
-      "\n# What a task prints goes to $out/slurm, see below.\n"
+      "\n#SBATCH --cpus-per-task=" + threads + "\n";
+  for (const std::string& option : job.options) script += "#SBATCH " + option + "\n";
+  script +=
+      "# What a task prints goes to $out/slurm, see below.\n"
       "#SBATCH --output=/dev/null\n\n";
   script += "program=" + Quoted(job.program) + "\nlist=" + Quoted(job.list) +
             "\nout=" + Quoted(job.out) + "\noptions=(--seed " + job.seed + " --checkpoint-every " +

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <string>
+#include <vector>
 
 namespace rotslam {
 
@@ -13,8 +14,9 @@ struct SlurmJob {
   std::string seed;
   int checkpoint_every = 0;
   int num_sequences = 0;
-  int max_running = 0;  // tasks at a time; 0: as many as the cluster gives
-  int num_threads = 1;  // cores of a task
+  int max_running = 0;               // tasks at a time; 0: as many as the cluster gives
+  int num_threads = 1;               // cores of a task
+  std::vector<std::string> options;  // of sbatch, one each: "--time=2:00:00"
 };
 
 /// The script for `sbatch`. It also runs without Slurm: SLURM_ARRAY_TASK_ID=2 bash FILE.

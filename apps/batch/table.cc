@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cstdint>
 #include <optional>
+#include <utility>
 
 #include "rotodom/types/text_file.h"
 
@@ -52,6 +53,49 @@ std::string Cell(const std::string& value) {
   return "<td>" + (value.empty() ? std::string("&ndash;") : value) + "</td>";
 }
 
+// A figure over the sequences that are done and have it: their median, or the worst of them.
+template <class Value>
+std::optional<Value> Over(const std::vector<BatchResult>& results,
+                          std::optional<Value> BatchResult::*figure,
+                          bool worst_is_least,
+                          bool is_median) {
+  std::vector<Value> values;
+  for (const BatchResult& result : results) {
+    if (result.status == "done" && result.*figure) values.push_back(*(result.*figure));
+  }
+  if (values.empty()) return std::nullopt;
+  std::sort(values.begin(), values.end());
+  if (!is_median) return worst_is_least ? values.front() : values.back();
+  const std::size_t middle = values.size() / 2;
+  if (values.size() % 2 != 0) return values[middle];
+  return static_cast<Value>((values[middle - 1] + values[middle]) / 2);
+}
+
+// Two lines over all sequences, under names that none of them can have.
+std::vector<BatchResult> SummaryOf(const std::vector<BatchResult>& results) {
+  const auto num_done = std::count_if(
+      results.begin(), results.end(), [](const BatchResult& one) { return one.status == "done"; });
+  const auto num_failed = std::count_if(results.begin(), results.end(), [](const BatchResult& one) {
+    return one.status == "failed";
+  });
+  std::vector<BatchResult> summary;
+  for (const bool is_median : {true, false}) {
+    BatchResult& row = summary.emplace_back();
+    row.name = is_median ? "(median)" : "(worst)";
+    row.frames = Over(results, &BatchResult::frames, true, is_median);
+    row.coverage = Over(results, &BatchResult::coverage, true, is_median);
+    row.rpe1_deg = Over(results, &BatchResult::rpe1_deg, false, is_median);
+    row.rpen_deg = Over(results, &BatchResult::rpen_deg, false, is_median);
+    row.ate = Over(results, &BatchResult::ate, false, is_median);
+    row.points = Over(results, &BatchResult::points, true, is_median);
+    row.cpu_s = Over(results, &BatchResult::cpu_s, false, is_median);
+    row.status = is_median
+                     ? std::to_string(num_done) + " of " + std::to_string(results.size()) + " done"
+                     : std::to_string(num_failed) + " failed";
+  }
+  return summary;
+}
+
 std::string HtmlRow(const BatchResult& result) {
   std::string row =
       "<tr class=\"" + std::string(result.status == "done" ? "done" : "other") + "\">";
@@ -65,7 +109,11 @@ std::string HtmlRow(const BatchResult& result) {
   row += Cell(Shown(result.rpe1_deg, "%.4f")) + Cell(Shown(result.rpen_deg, "%.4f"));
   row += Cell(Shown(result.ate, "%.4f")) + Cell(Shown(result.points));
   row += Cell(Shown(result.cpu_s, "%.1f"));
-  row += "<td class=\"status\">" + HtmlText(result.status) +
+  const std::string status = HtmlText(result.status);
+  row += "<td class=\"status\">" +
+         (result.status == "done" || result.log.empty()
+              ? status
+              : "<a href=\"" + HtmlText(result.log) + "\">" + status + "</a>") +
          (result.note.empty() ? "" : ": " + HtmlText(result.note)) + "</td></tr>\n";
   return row;
 }
@@ -88,8 +136,10 @@ p { color: var(--faint); }
 table { border-collapse: collapse; border-block: 2px solid var(--ink); font-variant-numeric: tabular-nums; }
 th, td { padding: .3rem .8rem; text-align: right; white-space: nowrap; }
 thead th { border-bottom: 1px solid var(--ink); }
+tfoot tr:first-child > * { border-top: 1px solid var(--ink); }
+tfoot .status { color: inherit; }
 tbody tr + tr > * { border-top: 1px solid var(--line); }
-tbody th { font-weight: 600; }
+tbody th, tfoot th { font-weight: 600; }
 a { color: inherit; }
 th:first-child, th:last-child, .status { text-align: left; }
 .status { white-space: normal; min-width: 8rem; }
@@ -106,7 +156,9 @@ constexpr const char* kTableHead =
 
 std::string ResultsCsv(const std::vector<BatchResult>& results) {
   std::string csv = "name,frames,coverage,rpe1_deg,rpen_deg,ate_m,points,cpu_s,status,note\n";
-  for (const BatchResult& result : results) {
+  std::vector<BatchResult> rows = results;
+  for (BatchResult& row : SummaryOf(results)) rows.push_back(std::move(row));
+  for (const BatchResult& result : rows) {
     csv += CsvField(result.name) + "," + Shown(result.frames) + "," +
            Shown(result.coverage, "%.4f") + "," + Shown(result.rpe1_deg, "%.12g") + "," +
            Shown(result.rpen_deg, "%.12g") + "," + Shown(result.ate, "%.12g") + "," +
@@ -130,7 +182,9 @@ std::string ResultsHtml(const std::vector<BatchResult>& results, const std::stri
           "results.csv.</p>\n";
   page += kTableHead;
   for (const BatchResult& result : results) page += HtmlRow(result);
-  return page + "</tbody>\n</table></div>\n</body>\n</html>\n";
+  page += "</tbody>\n<tfoot>\n";
+  for (const BatchResult& result : SummaryOf(results)) page += HtmlRow(result);
+  return page + "</tfoot>\n</table></div>\n</body>\n</html>\n";
 }
 
 }  // namespace rotslam

@@ -7,7 +7,8 @@
 
 namespace rotslam {
 
-/// The table as CSV, one line per sequence; missing figures are empty.
+/// The table as CSV, one line per sequence; missing figures are empty. Two lines follow over the
+/// sequences that are done: "(median)", and "(worst)", whose status says how many failed.
 std::string ResultsCsv(const std::vector<BatchResult>& results);
 
 /// The table as a page that needs no other file, light or dark as the reader's system is.

@@ -14,6 +14,7 @@ using Action = std::function<int()>;
 
 // One file per subcommand. Each adds its subcommand to `app` and sets `action` once it is parsed.
 void AddRunCommand(CLI::App& app, Action& action);
+void AddLiveCommand(CLI::App& app, Action& action);
 void AddRotationsCommand(CLI::App& app, Action& action);
 void AddSolveCommand(CLI::App& app, Action& action);
 void AddSimulateCommand(CLI::App& app, Action& action);
@@ -23,6 +24,7 @@ void AddEvalCommand(CLI::App& app, Action& action);
 void AddExportCommand(CLI::App& app, Action& action);
 void AddPanoramaCommand(CLI::App& app, Action& action);
 void AddInspectCommand(CLI::App& app, Action& action);
+void AddCheckCommand(CLI::App& app, Action& action);
 void AddReportCommand(CLI::App& app, Action& action);
 void AddPlotCommand(CLI::App& app, Action& action);
 void AddVocabularyCommand(CLI::App& app, Action& action);

@@ -64,12 +64,14 @@ int main(int argc, char** argv) {
     rotslam::Action action;
     rotslam::AddRunCommand(app, action);
     rotslam::AddRotationsCommand(app, action);
+    rotslam::AddLiveCommand(app, action);
     rotslam::AddInspectCommand(app, action);
     rotslam::AddSolveCommand(app, action);
     rotslam::AddExportCommand(app, action);
     rotslam::AddAverageCommand(app, action);
     rotslam::AddEvalCommand(app, action);
     rotslam::AddSimulateCommand(app, action);
+    rotslam::AddCheckCommand(app, action);
     rotslam::AddReportCommand(app, action);
     rotslam::AddPlotCommand(app, action);
     rotslam::AddPanoramaCommand(app, action);

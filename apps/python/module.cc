@@ -6,16 +6,19 @@
 
 PYBIND11_MODULE(rotslam, module) {
   module.doc() =
-      "Known-rotation monocular SLAM: the whole system, orientations frame by frame, positions "
-      "from "
-      "known rotations, evaluation.";
+      "Known-rotation monocular SLAM: the whole system, orientations frame by frame, averaging, "
+      "positions from known rotations, bundle adjustment, readers, evaluation.";
   module.attr("__version__") = rotslam::Version();
   // Our stages bring their own threads.
   cv::setNumThreads(1);
   rotslam::AddCamera(module);
   rotslam::AddSequence(module);
   rotslam::AddOdometry(module);
+  rotslam::AddAveraging(module);
   rotslam::AddKnownRotation(module);
+  rotslam::AddBundle(module);
+  rotslam::AddReaders(module);
   rotslam::AddSlam(module);
+  rotslam::AddLiveSlam(module);
   rotslam::AddEvaluation(module);
 }

@@ -11,7 +11,11 @@ void AddCamera(pybind11::module_& module);
 void AddSequence(pybind11::module_& module);
 void AddOdometry(pybind11::module_& module);
 void AddKnownRotation(pybind11::module_& module);
+void AddAveraging(pybind11::module_& module);
+void AddBundle(pybind11::module_& module);
+void AddReaders(pybind11::module_& module);
 void AddSlam(pybind11::module_& module);
+void AddLiveSlam(pybind11::module_& module);  // after AddSlam
 void AddEvaluation(pybind11::module_& module);
 
 }  // namespace rotslam

@@ -53,7 +53,10 @@ void OverrideGroup(const py::dict& given,
                    const std::vector<OptionRef>& options) {
   for (const auto& [name, value] : given) {
     const std::string key = prefix + std::string(py::str(name));
-    if (py::isinstance<py::dict>(value)) {
+    const bool is_group = std::any_of(options.begin(), options.end(), [&](const OptionRef& option) {
+      return option.key.starts_with(key + ".");
+    });
+    if (py::isinstance<py::dict>(value) && is_group) {
       OverrideGroup(py::reinterpret_borrow<py::dict>(value), key + ".", options);
       continue;
     }
@@ -64,9 +67,6 @@ void OverrideGroup(const py::dict& given,
       std::visit([&, v = value](const auto& field) { Assign(key, v, field); }, option.field);
     }
     if (found) continue;
-    const bool is_group = std::any_of(options.begin(), options.end(), [&](const OptionRef& option) {
-      return option.key.starts_with(key + ".");
-    });
     throw std::invalid_argument(is_group ? "\"" + key + "\" is a group of options, found " +
                                                std::string(py::repr(value))
                                          : UnknownOption(key, options));

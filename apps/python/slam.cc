@@ -5,6 +5,7 @@
 #include <cstdint>
 #include <limits>
 #include <memory>
+#include <mutex>
 #include <optional>
 #include <stdexcept>
 #include <string>
@@ -16,7 +17,9 @@
 #include "apps/python/arrays.h"
 #include "apps/python/module.h"
 #include "apps/python/options.h"
+#include "apps/python/problem.h"
 #include "apps/python/sequence.h"
+#include "apps/slam/live/live_slam.h"
 #include "output/map/ply.h"
 #include "output/trajectory/trajectory.h"
 
@@ -183,6 +186,16 @@ class PyResult {
     return map_.failure.empty() ? std::nullopt : std::optional(map_.failure);
   }
   const Camera& camera() const { return map_.camera; }
+  py::object Alignment() const {
+    if (!map_.sensor_alignment) return py::none();
+    const SensorAlignment& alignment = *map_.sensor_alignment;
+    return py::dict("offset_s"_a = alignment.offset_s,
+                    "offset_sigma_s"_a = alignment.offset_sigma_s,
+                    "has_offset"_a = alignment.has_offset,
+                    "cam_from_sensor"_a = ArrayOf(alignment.cam_from_sensor.Matrix()),
+                    "mounting_covariance"_a = ArrayOf(alignment.mounting_covariance),
+                    "has_mounting"_a = alignment.has_mounting);
+  }
   bool is_pure_rotation() const { return map_.rotates_throughout; }
   bool interrupted() const { return interrupted_; }
 
@@ -250,12 +263,12 @@ std::unique_ptr<ImageList> ImagesFrom(const py::object& pairs,
   return std::make_unique<ImageList>(std::move(frames));
 }
 
-// The camera given, or the one that lies with the images, or a guess whose focal length is found.
+// The camera given, or the one that lies with the images, or a guess whose lens is estimated.
 Camera CameraFor(const Sequence& sequence, const std::optional<Camera>& given, SlamInputs& inputs) {
   const cv::Size size = sequence.image_size();
   if (given) return MatchToImages(*given, size);
   if (const auto own = CameraOf(sequence)) return *own;
-  inputs.find_focal_length = true;
+  inputs.estimate_lens = true;
   return UncalibratedCamera(size, GuessFocalLength(size));
 }
 
@@ -273,11 +286,13 @@ std::unique_ptr<SequenceSource> OpenSource(const py::object& sequence) {
   return std::make_unique<SequenceSource>(path, options);
 }
 
-// Six parameters: the keyword arguments of rotslam.run.
+// Eight parameters: the keyword arguments of rotslam.run.
 std::unique_ptr<PyResult> Run(const py::object& sequence,
                               const std::optional<Camera>& given_camera,
                               const py::object& given_options,
                               const py::object& progress,
+                              const py::object& rotations,
+                              bool align,
                               std::uint64_t seed,
                               int threads) {
   SlamOptions options = OptionsFrom<SlamOptions>(given_options);
@@ -288,6 +303,7 @@ std::unique_ptr<PyResult> Run(const py::object& sequence,
     throw std::invalid_argument("progress must be a function of (stage, step, num_steps)");
   }
   SlamInputs inputs;
+  if (!rotations.is_none()) inputs.given = {"rotations", OrientationsFrom(rotations), align};
   std::unique_ptr<FrameSource> frames;
   Camera camera;
   if (py::isinstance<py::list>(sequence) || py::isinstance<py::tuple>(sequence)) {
@@ -303,7 +319,146 @@ std::unique_ptr<PyResult> Run(const py::object& sequence,
   return std::make_unique<PyResult>(RunSlam(*frames, camera, options, observer, inputs));
 }
 
+// A live session.
+class PyLiveSlam {
+ public:
+  PyLiveSlam(const Camera& camera,
+             const py::object& given_options,
+             bool keep_images,
+             std::uint64_t seed,
+             int threads)
+      : camera_(camera), keep_images_(keep_images) {
+    CheckThreads(threads);
+    if (camera.width < 1 || camera.height < 1) {
+      throw std::invalid_argument(
+          "camera has no size: its file does not say; give read_camera the width and height");
+    }
+    SlamOptions options = OptionsFrom<SlamOptions>(given_options);
+    options.seed = seed;
+    options.num_threads = threads;
+    slam_ = std::make_unique<LiveSlam>(camera, options);
+  }
+
+  py::object Add(const py::object& image, double timestamp_s) {
+    const cv::Mat pixels = ImageFrom("image", image, {camera_.width, camera_.height});
+    LiveEstimate estimate;
+    {
+      const py::gil_scoped_release unlocked;
+      const std::lock_guard lock(mutex_);
+      if (!slam_) throw std::invalid_argument("the session is finished");
+      estimate = slam_->AddFrame(timestamp_s, pixels);
+      if (keep_images_) {
+        Frame frame;
+        frame.id = estimate.frame;
+        frame.timestamp_s = timestamp_s;
+        frame.image = pixels;
+        if (pixels.empty()) frame.problem = "no image";
+        frames_.push_back(std::move(frame));
+      }
+    }
+    const py::object covariance =
+        estimate.covariance ? py::object(ArrayOf(*estimate.covariance)) : py::none();
+    const py::object position =
+        estimate.center_in_world
+            ? py::object(ArrayOf(*estimate.center_in_world).reshape({py::ssize_t{3}}))
+            : py::none();
+    return py::module_::import("rotslam").attr("LiveEstimate")(
+        QuaternionOf(estimate.cam_from_world),
+        covariance,
+        position,
+        ToString(estimate.state),
+        estimate.num_points,
+        estimate.map_revision);
+  }
+
+  // From any thread, while a frame is added, too.
+  py::object Map() const {
+    const std::shared_ptr<const LiveMap> map = slam_ ? slam_->Map() : nullptr;
+    if (!map) return py::none();
+    std::vector<Eigen::Vector3d> points;
+    std::vector<Eigen::Vector3d> centers;
+    py::list keyframes;
+    points.reserve(map->points.size());
+    centers.reserve(map->keyframes.size());
+    for (const LivePoint& point : map->points) points.push_back(point.point_in_world);
+    for (const LiveKeyframe& keyframe : map->keyframes) {
+      centers.push_back(keyframe.center_in_world);
+      keyframes.append(keyframe.frame.value);
+    }
+    return py::module_::import("rotslam").attr("LiveMap")(
+        map->revision, keyframes, PointsOf(centers), PointsOf(points));
+  }
+
+  std::unique_ptr<PyResult> Finish() {
+    const py::gil_scoped_release unlocked;
+    const std::lock_guard lock(mutex_);
+    if (!slam_) throw std::invalid_argument("the session is finished");
+    ImageList images(std::move(frames_));
+    SlamObserver nobody;
+    auto result =
+        std::make_unique<PyResult>(slam_->Finish(keep_images_ ? &images : nullptr, nobody));
+    slam_.reset();
+    return result;
+  }
+
+ private:
+  std::mutex mutex_;
+  Camera camera_;
+  bool keep_images_;
+  std::vector<Frame> frames_;
+  std::unique_ptr<LiveSlam> slam_;  // null: finished
+};
+
 }  // namespace
+
+void AddLiveSlam(py::module_& module) {
+  const py::object named = py::module_::import("collections").attr("namedtuple");
+  module.attr("LiveEstimate") =
+      named("LiveEstimate",
+            "world_from_cam covariance position state num_points revision",
+            "module"_a = "rotslam");
+  module.attr("LiveEstimate").attr("__doc__") = R"(What one frame of a live session brought.
+
+world_from_cam: quaternion [4], x y z w, camera->world.
+covariance:     [3, 3], rad^2, about the camera's axes; None where nothing is known.
+position:       [3], the centre in the map's world; None where nothing tells it.
+state:          "starting", "tracking", "rotating", "still" or "extrapolated".
+num_points:     of the map that agree with the pose.
+revision:       of the map; 0 where there is none.)";
+  module.attr("LiveMap") =
+      named("LiveMap", "revision keyframes positions points", "module"_a = "rotslam");
+  module.attr("LiveMap").attr("__doc__") = R"(The map of a live session as it stood once.
+
+keyframes: frame numbers [k]; positions [k, 3]: their centres; points [p, 3]: in the world.)";
+  py::class_<PyLiveSlam>(
+      module, "LiveSlam", R"(A pose for every frame at once, and a map that grows.
+
+options:     a dict whose dicts are the groups in summary.json.
+keep_images: remember the images, so that finish() finds points in all of them, as rotslam.run does.
+Raises ValueError for an option that does not exist or is out of range. C++:
+apps/slam/live/live_slam.h.)")
+      .def(py::init<const Camera&, const py::object&, bool, std::uint64_t, int>(),
+           "camera"_a,
+           "options"_a = py::none(),
+           "keep_images"_a = false,
+           "seed"_a = 1,
+           "threads"_a = 2)
+      .def("add",
+           &PyLiveSlam::Add,
+           "image"_a,
+           "timestamp"_a,
+           R"(Takes the next frame and gives its LiveEstimate at once.
+
+image:     uint8 [height, width] or [height, width, 3] (BGR) of the camera's size; None for a frame
+           that is lost.
+timestamp: seconds, ascending.
+Other Python threads run meanwhile. Raises ValueError for another dtype, shape or order in time.)")
+      .def("map", &PyLiveSlam::Map, "The LiveMap of the newest pose; None where there is none.")
+      .def("finish",
+           &PyLiveSlam::Finish,
+           "Ends the session: a Result, with keep_images that of rotslam.run for the same frames. "
+           "Raises RuntimeError where there are too few frames.");
+}
 
 // A table: one entry for each property of Result, then rotslam.run.
 void AddSlam(py::module_& module) {
@@ -337,6 +492,10 @@ void AddSlam(py::module_& module) {
                              &PyResult::Segments,
                              "[(first, last)], frames between which the camera only rotates.")
       .def_property_readonly("camera", &PyResult::camera, "As bundle adjustment has refined it.")
+      .def_property_readonly("sensor_alignment",
+                             &PyResult::Alignment,
+                             "How the `rotations` given lie in time and on the camera, a dict with "
+                             "offset_s, cam_from_sensor [3, 3] and deviations; else None.")
       .def_property_readonly("is_pure_rotation",
                              &PyResult::is_pure_rotation,
                              "Whether the camera never changes its place: there is no map then.")
@@ -353,6 +512,8 @@ void AddSlam(py::module_& module) {
              "camera"_a = py::none(),
              "options"_a = py::none(),
              "progress"_a = py::none(),
+             "rotations"_a = py::none(),
+             "align"_a = false,
              "seed"_a = 1,
              "threads"_a = 1,
              R"(The whole system: from images to orientations, positions and points.
@@ -366,6 +527,9 @@ options:  a dict whose dicts are the groups in summary.json, for example
 progress: function of (stage, step, num_steps), called when a stage begins, with step 0, and of
           stage "orientations" after every frame; num_steps is -1 where it is not known. Once it
           has returned False the run stops after that frame, without a map.
+rotations: orientations of a sensor, a file as `rotslam run --rotations` reads it or [k, 5] rows
+          (timestamp qx qy qz qw, camera->world): they count as much as they agree with the images.
+align:    take out their offset in time and their mounting; see Result.sensor_alignment.
 
 Returns a Result. That there is no map is no error: see Result.failure. Other Python threads run
 meanwhile. Raises ValueError for wrong arguments, RuntimeError where images cannot be read or no two

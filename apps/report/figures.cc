@@ -9,6 +9,7 @@
 
 #include <Eigen/Geometry>
 
+#include "apps/page/camera_angles.h"
 #include "apps/report/axes.h"
 #include "apps/report/stage_figures.h"
 #include "rotodom/types/text_file.h"
@@ -334,7 +335,7 @@ Drawing RuntimeFigure(const RunData& run) {
         {kNameWidth - 6.0, y + 10.0}, name, {TextAnchor::kEnd, 9.0, false, false, kInk});
     const double length = std::max(0.5, (kWidth - kNameWidth - 60.0) * seconds / longest);
     const bool is_whole =
-        name == "total" || name == "focal guess" || name == "orientations" || name == "positions";
+        name == "total" || name == "lens" || name == "orientations" || name == "positions";
     Color color = kBlue;
     const bool is_round = name.starts_with("bundle ") && name != "bundle adjustment";
     if (!is_whole) color.opacity = is_round ? 0.25 : 0.55;

@@ -9,6 +9,8 @@
 #include <utility>
 #include <vector>
 
+#include "apps/page/camera_angles.h"
+#include "apps/page/encoded_array.h"
 #include "output/map/map_keypoints.h"
 #include "output/map/ply.h"
 #include "output/tables/summary.h"
@@ -17,21 +19,6 @@ namespace rotslam {
 namespace {
 
 using Json = nlohmann::ordered_json;
-
-template <class T>
-const char* TypeName() {
-  if constexpr (std::is_same_v<T, float>) return "f32";
-  if constexpr (std::is_same_v<T, std::int32_t>) return "i32";
-  if constexpr (std::is_same_v<T, std::uint16_t>) return "u16";
-  return "u8";
-}
-
-template <class T>
-Json Array(const std::vector<T>& values, int columns) {
-  const std::string_view bytes(reinterpret_cast<const char*>(values.data()),
-                               values.size() * sizeof(T));
-  return {{"type", TypeName<T>()}, {"columns", columns}, {"data", Base64(bytes)}};
-}
 
 void Append(const Eigen::Vector3d& vector, std::vector<float>& values) {
   for (const double value : vector) values.push_back(static_cast<float>(value));
@@ -133,21 +120,22 @@ Json FramesData(const RunData& run, const std::vector<int>& frames) {
     edges.push_back(row.inlier_edges);
     flags.push_back(FlagBits(row.flags));
   }
-  Json data = {{"frame", Array(std::vector<std::int32_t>(frames.begin(), frames.end()), 1)},
-               {"time_s", Array(time, 1)},
-               {"quaternion", Array(quaternion, 4)},
-               {"angle_deg", Array(angle, 3)},
-               {"sigma_deg", Array(sigma, 3)},
-               {"edges", Array(edges, 1)},
-               {"flags", Array(flags, 1)}};
-  if (run.HasPositions()) data["position"] = Array(position, 3);
+  Json data = {{"frame", EncodedArray(std::vector<std::int32_t>(frames.begin(), frames.end()), 1)},
+               {"time_s", EncodedArray(time, 1)},
+               {"quaternion", EncodedArray(quaternion, 4)},
+               {"angle_deg", EncodedArray(angle, 3)},
+               {"sigma_deg", EncodedArray(sigma, 3)},
+               {"edges", EncodedArray(edges, 1)},
+               {"flags", EncodedArray(flags, 1)}};
+  if (run.HasPositions()) data["position"] = EncodedArray(position, 3);
   if (run.keyframe_map) {
-    data["inliers"] = Array(Chosen(MeanInliers(*run.keyframe_map, run.NumFrames()), frames), 1);
+    data["inliers"] =
+        EncodedArray(Chosen(MeanInliers(*run.keyframe_map, run.NumFrames()), frames), 1);
   }
   if (run.cloud && !run.cloud->tracks.empty()) {
     const TrackCounts counts = CountTracks(*run.cloud, run.NumFrames());
-    data["tracks"] = Array(Chosen(counts.tracks, frames), 1);
-    data["track_length"] = Array(Chosen(counts.mean_length, frames), 1);
+    data["tracks"] = EncodedArray(Chosen(counts.tracks, frames), 1);
+    data["track_length"] = EncodedArray(Chosen(counts.mean_length, frames), 1);
   }
   return data;
 }
@@ -165,7 +153,9 @@ Json CloudData(const RunMap& map, const PageLimits& limits) {
     const auto& color = points[k]->track.rgb;
     rgb.insert(rgb.end(), color.begin(), color.end());
   }
-  return {{"count", points.size()}, {"position", Array(position, 3)}, {"rgb", Array(rgb, 3)}};
+  return {{"count", points.size()},
+          {"position", EncodedArray(position, 3)},
+          {"rgb", EncodedArray(rgb, 3)}};
 }
 
 Json KeyframesData(const RunMap& map) {
@@ -176,7 +166,7 @@ Json KeyframesData(const RunMap& map) {
     centers[frame.id] = frame.center_in_world;
     frames.push_back(frame.id.value);
   }
-  return {{"frame", Array(frames, 1)},
+  return {{"frame", EncodedArray(frames, 1)},
           {"frustum_size", FrustumSize(centers)},
           {"tan_x", 0.5 * map.camera.width / map.camera.fx},
           {"tan_y", 0.5 * map.camera.height / map.camera.fy}};
@@ -193,8 +183,9 @@ Json GraphData(const RunData& run, const PageLimits& limits) {
     sigma.push_back(
         static_cast<float>(kDegFromRad * std::sqrt(std::abs(edge.covariance.trace()) / 3.0)));
   }
-  return {
-      {"count", run.edges.size()}, {"frames", Array(frames, 2)}, {"sigma_deg", Array(sigma, 1)}};
+  return {{"count", run.edges.size()},
+          {"frames", EncodedArray(frames, 2)},
+          {"sigma_deg", EncodedArray(sigma, 1)}};
 }
 
 Json LoopsData(const std::vector<LoopRow>& loops) {
@@ -260,13 +251,13 @@ Json TruthJson(const RunData& run, int step) {
   }
   Json data = {{"file", truth.file},
                {"rotations", MetricsData(truth.rotations)},
-               {"frame", Array(frames, 1)},
-               {"angle_deg", Array(angle, 3)},
-               {"error_deg", Array(error, 3)}};
+               {"frame", EncodedArray(frames, 1)},
+               {"angle_deg", EncodedArray(angle, 3)},
+               {"error_deg", EncodedArray(error, 3)}};
   if (truth.trajectory) data["trajectory"] = MetricsData(*truth.trajectory);
   if (position.empty()) return data;
-  data["position"] = Array(position, 3);
-  data["position_error_m"] = Array(position_error, 1);
+  data["position"] = EncodedArray(position, 3);
+  data["position_error_m"] = EncodedArray(position_error, 1);
   return data;
 }
 
@@ -308,7 +299,7 @@ Json ThumbnailsData(const RunData& run, const Thumbnails& thumbnails, const Page
     Json entry = {{"frame", thumbnails.frames[k]}, {"jpeg", Base64(thumbnails.jpegs[k])}};
     const auto found = features.find(thumbnails.frames[k]);
     if (found != features.end()) {
-      entry["features"] = Array(Packed(found->second, limits.max_features_per_frame), 2);
+      entry["features"] = EncodedArray(Packed(found->second, limits.max_features_per_frame), 2);
     }
     list.push_back(std::move(entry));
   }
@@ -326,30 +317,23 @@ Json FilesData(const std::filesystem::path& directory) {
   return files;
 }
 
-}  // namespace
-
-std::string Base64(std::string_view bytes) {
-  constexpr std::string_view kDigits =
-      "ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789+/";
-  std::string text;
-  text.reserve((bytes.size() + 2) / 3 * 4);
-  for (std::size_t k = 0; k < bytes.size(); k += 3) {
-    const std::size_t count = std::min<std::size_t>(3, bytes.size() - k);
-    std::uint32_t word = 0;
-    for (std::size_t n = 0; n < 3; ++n) {
-      word = (word << 8) | (n < count ? static_cast<unsigned char>(bytes[k + n]) : 0U);
-    }
-    for (std::size_t n = 0; n < 4; ++n) {
-      text += n <= count ? kDigits[(word >> (18 - 6 * n)) & 63U] : '=';
-    }
+Json CheckData(const RunCheck& check) {
+  Json reasons = Json::array();
+  for (const CheckReason& reason : check.reasons) {
+    reasons.push_back(
+        {{"verdict", Name(reason.verdict)}, {"frames", reason.frames}, {"text", reason.text}});
   }
-  return text;
+  return {
+      {"verdict", Name(check.verdict)}, {"line", Describe(check)}, {"reasons", std::move(reasons)}};
 }
+
+}  // namespace
 
 Json PageData(const RunData& run, const Thumbnails& thumbnails, const PageLimits& limits) {
   const int step = StepFor(run.rotations.size(), limits.max_frames);
   const std::vector<int> frames = EveryStep(run.NumFrames(), step);
   Json data = {{"version", Version()},
+               {"check", CheckData(run.check)},
                {"run", std::filesystem::absolute(run.directory).lexically_normal().string()},
                {"summary", run.summary},
                {"frame_step", step},

@@ -1,8 +1,5 @@
 #pragma once
 
-#include <string>
-#include <string_view>
-
 #include <nlohmann/json.hpp>
 
 #include "apps/report/run_data.h"
@@ -26,8 +23,5 @@ struct PageLimits {
 nlohmann::ordered_json PageData(const RunData& run,
                                 const Thumbnails& thumbnails,
                                 const PageLimits& limits);
-
-/// Encodes binary data as base64.
-std::string Base64(std::string_view bytes);
 
 }  // namespace rotslam

@@ -1,6 +1,5 @@
 // Everything around the view: head, notes, curves, tables, and the transport that moves through time.
 
-const $ = (id) => document.getElementById(id);
 const counts = summary.counts || {};
 const kFileOfPoses = hasPositions ? 'trajectory_tum.txt' : 'rotations.csv';
 
@@ -10,26 +9,6 @@ function sourceLine(...parts) {
   parts.forEach((part, k) => line.append(k > 0 ? ', ' : '', h('code', {}, part)));
   return line;
 }
-
-function panel(parent, title, ...children) {
-  const section = h('section', {class: 'panel'}, h('h2', {}, title), ...children);
-  parent.append(section);
-  return section;
-}
-
-function table(rows, header) {
-  const element = h('table', {});
-  const cells = (row, tag) => h('tr', {}, ...row.map((cell) => {
-    const numeric = typeof cell === 'number' || (cell && cell.number !== undefined);
-    const text = cell && cell.number !== undefined ? cell.number : cell;
-    return h(tag, numeric ? {class: 'number'} : {}, text instanceof Node ? text : String(text));
-  }));
-  if (header) element.append(cells(header, 'th'));
-  for (const row of rows) element.append(cells(row, 'td'));
-  return element;
-}
-
-const number = (text) => ({number: text});
 
 function baseName(path) {
   const parts = String(path || '').split('/').filter((part) => part.length > 0);
@@ -43,6 +22,14 @@ function buildHead() {
   const head = $('head');
   head.append(h('h1', {}, name + ' ', h('small', {}, 'rotslam ' + (summary.command || 'run') + ' ' + data.version)));
   head.append(h('p', {class: 'lead'}, (sequence.description || '') + ' → ' + data.run));
+  const check = data.check;
+  const kClassOf = {'green': 'note', 'look at': 'note warning', 'do not use': 'note warning'};
+  const verdict = h('div', {class: kClassOf[check.verdict], id: 'check'}, check.line);
+  if (check.reasons.length > 0) {
+    verdict.append(h('ul', {}, ...check.reasons.map((reason) =>
+      h('li', {}, `${reason.frames}: ${reason.text}`))));
+  }
+  head.append(verdict);
   const facts = h('div', {class: 'facts'});
   const fact = (value, label) => {
     if (value !== undefined && value !== null) facts.append(h('div', {class: 'fact'}, h('b', {}, value), h('span', {}, label)));
@@ -79,10 +66,14 @@ function buildNotes() {
   }
   if (summary.interrupted) note('The run was interrupted: the results end there.');
   const calibration = summary.calibration || {};
-  if (String(calibration.source).startsWith('focal_guess')) {
-    warn(`No calibration: the focal length began as a guess of ${significant(calibration.guess_px, 5)} px ` +
-      `and is ${significant(calibration.refined_px, 5)} px now. Angles and shape are as wrong as it is. ` +
-      'Calibrate the camera for better results (rotslam calibrate).');
+  if (calibration.source === 'images') {
+    note(`No calibration: the lens is estimated from the images, its focal length ${significant(calibration.refined_px, 5)} px. ` +
+      'Angles and shapes may be off by some tenths of a percent.');
+  }
+  if (calibration.source === 'guess') {
+    warn('No calibration, and the images do not tell the lens: the focal length is a guess of ' +
+      `${significant(calibration.refined_px, 5)} px. Angles and shapes are as wrong as it is. ` +
+      'Calibrate the camera (rotslam calibrate).');
   }
   if (calibration.source === 'pure_rotation') {
     warn(`The camera only rotates if its focal length is ${significant(calibration.refined_px, 5)} px, ` +
@@ -240,6 +231,15 @@ function drawBracket(canvas, low, high) {
   for (const value of scale.list) context.fillText(value.toFixed(scale.decimals), Math.min(width - 12, x(value)), 54);
 }
 
+// How far bundle adjustment's largest residual is from the least possible one, in one sentence.
+function finalBracketSentence(final) {
+  const kept = `After bundle adjustment the largest residual of the ${whole(final.observations)} observations that it keeps is ` +
+    `${significant(final.largest_residual_px, 3)} px`;
+  if (!(final.gamma_low_px > 0)) return kept + '; no lower bound is proven.';
+  return kept + `; with its orientations no positions and points have one below ${significant(final.gamma_low_px, 3)} px (proven), ` +
+    `and some reach ${significant(final.gamma_high_px, 3)} px.`;
+}
+
 function buildKrot(parent) {
   const krot = summary.krot;
   if (!krot) return;
@@ -255,7 +255,9 @@ function buildKrot(parent) {
     element.append(canvas);
     redraws.push(() => drawBracket(canvas, krot.gamma_low_px || 0, krot.gamma_high_px));
   }
-  element.append(table(rows), sourceLine('summary.json'));
+  element.append(table(rows));
+  if (krot.final) element.append(h('p', {}, finalBracketSentence(krot.final)));
+  element.append(sourceLine('summary.json'));
 }
 
 // Nested names in one list: "loop.use" and its value.
@@ -277,7 +279,7 @@ function buildFigures(parent) {
   list('Camera', summary.camera);
 }
 
-const kStages = [['focal_guess', []], ['orientations', ['pyramid', 'tracking', 'detection', 'edges', 'averaging', 'covariance', 'loop_description',
+const kStages = [['lens', []], ['orientations', ['pyramid', 'tracking', 'detection', 'edges', 'averaging', 'covariance', 'loop_description',
   'loop_candidates', 'loop_verification', 'global_averaging']],
 ['positions', ['known_rotation', 'bundle_adjustment', 'bundle_fixed_rotation', 'bundle_coarse', 'bundle_lens', 'bundle_fine', 'bundle_final']]];
 
@@ -513,28 +515,7 @@ function buildView() {
     $('view').append(h('div', {class: 'absent'}, 'This browser shows no WebGL, which the map needs: ' + error.message));
     return null;
   }
-  const legend = $('legend'), tools = $('view-tools');
-  const marks = [];
-  for (const [name, {label, colorName, shown}] of Object.entries(scene.layers)) {
-    const mark = h('i', {});
-    if (name === 'cloud') mark.className = 'colourful';
-    else marks.push([mark, colorName]);
-    legend.append(h('span', {}, mark, label));
-    if (name === 'marker') continue;
-    const box = h('input', {type: 'checkbox'});
-    box.checked = shown;
-    box.addEventListener('change', () => scene.show(name, box.checked));
-    tools.append(h('label', {}, box, label));
-  }
-  for (const [text, above] of [['top', true], ['reset', false]]) {
-    const button = h('button', {}, text);
-    button.addEventListener('click', () => scene.look(above));
-    tools.append(button);
-  }
-  redraws.push(() => {
-    scene.setColors();
-    for (const [mark, colorName] of marks) mark.style.background = color(colorName);
-  });
+  redraws.push(addViewTools(scene));
   listeners.push((place) => scene.setFrame(place));
   return scene;
 }

@@ -151,6 +151,7 @@ RunData ReadRunData(const fs::path& run) {
                              ": has no frames; run the sequence again");
   }
   const auto is_there = [&](const char* name) { return fs::exists(run / name); };
+  data.check = CheckRun(run);
   if (is_there("loops.csv")) data.loops = ReadLoopsCsv(run / "loops.csv");
   if (is_there("view_graph.g2o")) data.edges = ReadG2o(run / "view_graph.g2o").graph.edges();
   // Other files in the folder are then from an older run.
@@ -178,25 +179,6 @@ void AddTruth(const TruthSource& source, const MetricsOptions& options, RunData&
   } catch (const std::exception& error) {
     run.truth_problem = error.what();
   }
-}
-
-std::vector<Eigen::Vector3d> RollPitchYawDeg(const std::vector<Rotation>& world_from_cam) {
-  std::vector<Eigen::Vector3d> angles_deg;
-  angles_deg.reserve(world_from_cam.size());
-  for (const Rotation& rotation : world_from_cam) {
-    const Eigen::Matrix3d R_w_c = rotation.Matrix();
-    Eigen::Vector3d angle_deg =
-        kDegFromRad * Eigen::Vector3d(std::atan2(R_w_c(1, 0), R_w_c(1, 1)),
-                                      std::asin(std::clamp(-R_w_c(1, 2), -1.0, 1.0)),
-                                      std::atan2(R_w_c(0, 2), R_w_c(2, 2)));
-    if (!angles_deg.empty()) {
-      for (int axis = 0; axis < 3; ++axis) {
-        angle_deg[axis] -= 360.0 * std::round((angle_deg[axis] - angles_deg.back()[axis]) / 360.0);
-      }
-    }
-    angles_deg.push_back(angle_deg);
-  }
-  return angles_deg;
 }
 
 Eigen::Vector3d ErrorDeg(const Rotation& world_from_cam, const Rotation& true_world_from_cam) {

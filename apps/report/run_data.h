@@ -8,6 +8,7 @@
 #include <Eigen/Core>
 #include <nlohmann/json.hpp>
 
+#include "apps/report/run_check.h"
 #include "output/map/run_map.h"
 #include "output/tables/loops_csv.h"
 #include "output/tables/rotations_csv.h"
@@ -49,6 +50,7 @@ struct RunData {
   std::optional<RunMap> keyframe_map;   // map.bin
   std::optional<RunMap> cloud;          // map_all_frames.bin
   std::optional<TruthData> truth;
+  RunCheck check;             // what in the run to trust
   std::string truth_problem;  // why the ground truth beside the images could not be used
 
   int NumFrames() const { return static_cast<int>(rotations.size()); }
@@ -70,13 +72,6 @@ struct TruthSource {
 /// Sets `run.truth`. Throws std::runtime_error where a file given by the user cannot be used. For a
 /// file found beside the images, the reason is written to `truth_problem` instead.
 void AddTruth(const TruthSource& source, const MetricsOptions& options, RunData& run);
-
-/// Yaw, pitch and roll of a camera against the world: world_from_cam = Ry(yaw) Rx(pitch) Rz(roll).
-/// Seen by the camera's axes (x right, y down, z forward) yaw turns right, pitch up, roll
-/// clockwise.
-/// @return  roll, pitch, yaw of each orientation in degrees; multiples of 360 deg are added so that
-///          each is as close as possible to the one before.
-std::vector<Eigen::Vector3d> RollPitchYawDeg(const std::vector<Rotation>& world_from_cam);
 
 /// Difference of two orientations of a camera as a rotation vector in camera axes, deg.
 Eigen::Vector3d ErrorDeg(const Rotation& world_from_cam, const Rotation& true_world_from_cam);

@@ -268,6 +268,31 @@ Drawing MotionFigure(const RunData& run) {
   return drawing;
 }
 
+// Standard deviations of the orientations, by what they rest on.
+Drawing SourcesFigure(const RunData& run) {
+  Series images = {"images", {}, kFirst, 2.5};
+  Series both = {"images and given", {}, kThird, 2.5};
+  Series given = {"given alone", {}, kSecond, 2.5};
+  for (const RotationRow& row : run.rotations) {
+    if (!row.sigma_deg) continue;
+    const auto has = [&](const char* flag) {
+      return std::find(row.flags.begin(), row.flags.end(), flag) != row.flags.end();
+    };
+    Series& series = !has("given") ? images : has("images") ? both : given;
+    series.points.emplace_back(SecondsOf(run, row.frame), row.sigma_deg->norm() / std::sqrt(3.0));
+  }
+  const Panel panel = {"time, s", "standard deviation, deg"};
+  Drawing drawing(kPageWidth, PageHeight(panel));
+  DrawPanel(panel, {images, both, given}, drawing);
+  return drawing;
+}
+
+bool HasGivenOrientations(const RunData& run) {
+  return std::any_of(run.rotations.begin(), run.rotations.end(), [](const RotationRow& row) {
+    return std::find(row.flags.begin(), row.flags.end(), "given") != row.flags.end();
+  });
+}
+
 Drawing KeyframesFigure(const RunData& run) {
   const std::vector<std::vector<int>> tracks = TracksOfFrames(*run.cloud, run.NumFrames());
   PlotPoints shares, keyframes;
@@ -422,6 +447,7 @@ std::vector<Figure> MakeStageFigures(const RunData& run) {
   }
   if (!run.edges.empty()) figures.push_back({"view_graph", ViewGraphFigure(run)});
   if (run.HasPositions()) figures.push_back({"motion", MotionFigure(run)});
+  if (HasGivenOrientations(run)) figures.push_back({"sources", SourcesFigure(run)});
   AddMapFigures(run, figures);
   const double readout_s = SummaryNumber(run, "camera", "readout_s");
   if (readout_s > 0.0) {

@@ -7,13 +7,18 @@
 #include <utility>
 
 #include "apps/slam/frame_registration.h"
+#include "apps/slam/map/calibration_check.h"
 #include "apps/slam/map/cloud.h"
 #include "apps/slam/map/component_alignment.h"
 #include "apps/slam/map/pure_rotation.h"
+#include "apps/slam/map/some_tracks.h"
+#include "apps/slam/map/stated_sigmas.h"
 #include "apps/slam/map_correction/map_correction.h"
 #include "apps/slam/map_views.h"
 #include "rotodom/averaging/anchors.h"
+#include "rotodom/averaging/global_averaging.h"
 #include "rotodom/motion_blur/keypoint_blur.h"
+#include "rotodom/self_calibration/through_lens.h"
 
 namespace rotslam {
 namespace {
@@ -48,16 +53,33 @@ MapResult WithoutMap(MapResult result, std::string failure) {
   return result;
 }
 
+// Without a map, frames have a position only where the camera never leaves its place.
+void DescribeFramesWithoutMap(const Orientations& orientations, MapResult& result) {
+  for (const auto& [frame, rotation] : result.cam_from_world) {
+    FramePose& pose = result.frame_poses[frame];
+    if (!result.rotates_throughout) {
+      pose.note = "there is no map";
+      continue;
+    }
+    const bool is_interpolated = orientations.unconnected.contains(frame);
+    pose.state = is_interpolated ? PoseState::kInterpolated : PoseState::kHeld;
+    pose.note = is_interpolated ? "orientation interpolated" : "position of a pure rotation";
+  }
+}
+
 // The result of a pure rotation throughout: one segment, every frame at the origin, no points.
 MapResult PureRotationThroughout(const MapResult& moving,
                                  const PureRotationResult& rotation,
                                  const Orientations& orientations,
-                                 const AveragingOptions& options) {
+                                 const SlamOptions& options) {
   MapResult result;
-  result.cam_from_world = FollowAnchors(
-      orientations.graph, orientations.cam_from_world, rotation.cam_from_world, options);
+  result.cam_from_world = FollowAnchors(orientations.graph,
+                                        orientations.cam_from_world,
+                                        rotation.cam_from_world,
+                                        options.rotodom.averaging);
   InterpolateUnknown(orientations, orientations.unconnected, result.cam_from_world);
   result.camera = rotation.camera;
+  result.lens_sigmas = StatedSigmas(rotation.lens_sigmas, options.ba.lens, result.camera);
   result.keyframes = moving.keyframes;
   result.keyframe_tracks = moving.keyframe_tracks;
   result.num_rotation_observations = rotation.num_observations;
@@ -67,6 +89,20 @@ MapResult PureRotationThroughout(const MapResult& moving,
        static_cast<double>(rotation.num_observations) / NumObservations(result.keyframe_tracks)});
   result.rotates_throughout = true;
   return WithoutMap(std::move(result), {});
+}
+
+// Whether the camera is at rest but for the tremor of the hand that holds it: pairs of frames show
+// little parallax, also those far apart, which tracks from the keyframes connect.
+bool HardlyMoves(const ViewGraph& graph, double focal_px) {
+  // A hand moves by some millimetres, 9 mm at a distance of 1 m.
+  constexpr double kTremor = 0.5 * kRadFromDeg;
+  // Of the edges; the others may be those on things that move.
+  constexpr double kShare = 0.9;
+  const auto num_still =
+      std::count_if(graph.edges().begin(), graph.edges().end(), [&](const RelativeRotation& edge) {
+        return edge.rotation_only || edge.parallax_px <= kTremor * focal_px;
+      });
+  return static_cast<double>(num_still) >= kShare * static_cast<double>(graph.edges().size());
 }
 
 RotationRates RatesOf(const Orientations& orientations) {
@@ -123,13 +159,22 @@ class KeyframeMapBuilder {
   void SolveKnownRotation();
   void AdjustComponents();
   void CorrectMaps();
+  void CheckCalibration();
   void AlignComponents();
   std::optional<MapResult> PureRotationExplainsMore() const;
 
   // Whether, by the relative rotations of pairs of views, the camera is at rest or only rotates
   // from the first frame to the last. Such a rotation determines the focal length.
   bool StaysThroughout() const;
-  bool SeeksFocalLength() const { return StaysThroughout() && options_.ba.lens.refine_focal; }
+  // Whether the reason that there is no map is a camera that moves too little for one.
+  bool HardlyMovesThroughout() const;
+  // The result of such a camera: one segment, orientations alone.
+  MapResult AtRest();
+  const BundleResult* LargestBundle() const;
+  void StateSigmas();
+  bool SeeksFocalLength() const {
+    return StaysThroughout() && options_.ba.lens.refine_focal && !orientations_.CameraStands();
+  }
 
   MapViews ReadViews(const Reconstruction& map, const std::set<FrameId>& frames) const;
   TrackCompletion CompletionByImages() const;
@@ -161,8 +206,10 @@ KeyframeMapBuilder::KeyframeMapBuilder(const Orientations& orientations,
       bundle_options_(options.ba),
       complete_(CompletionByImages()) {
   bundle_options_.num_threads = options.num_threads;
+  bundle_options_.find_lens_covariance = true;
   result_.cam_from_world = orientations.cam_from_world;
   result_.camera = orientations.camera;
+  result_.lens_sigmas = StatedSigmas(std::nullopt, bundle_options_.lens, result_.camera);
 }
 
 MapResult KeyframeMapBuilder::Build() {
@@ -180,6 +227,7 @@ MapResult KeyframeMapBuilder::Build() {
   SolveKnownRotation();
   if (!result_.krot.Usable()) {
     if (auto rotation = PureRotationExplainsMore()) return *std::move(rotation);
+    if (HardlyMovesThroughout()) return AtRest();
     std::string failure = result_.krot.message;
     if (result_.keyframe_tracks.empty()) {
       failure += "; the camera moves too little in these " +
@@ -191,14 +239,36 @@ MapResult KeyframeMapBuilder::Build() {
   observer_.OnBegin(SlamStage::kBundleAdjustment, -1);
   AdjustComponents();
   CorrectMaps();
+  StateSigmas();
+  CheckCalibration();
+  result_.final_bracket = BracketComponents(refined_, options_.krot);
   AlignComponents();
   if (result_.components.empty()) {
     if (auto rotation = PureRotationExplainsMore()) return *std::move(rotation);
+    if (HardlyMovesThroughout()) return AtRest();
     return WithoutMap(std::move(result_), "bundle adjustment found no usable map");
   }
   observer_.OnEnd(SlamStage::kBundleAdjustment, result_);
   if (auto rotation = PureRotationExplainsMore()) return *std::move(rotation);
   return std::move(result_);
+}
+
+bool KeyframeMapBuilder::HardlyMovesThroughout() const {
+  return options_.pure_rotation_segments.enabled && orientations_.breaks.empty() &&
+         HardlyMoves(orientations_.graph, orientations_.camera.MeanFocal());
+}
+
+MapResult KeyframeMapBuilder::AtRest() {
+  MapResult result;
+  result.cam_from_world = orientations_.cam_from_world;
+  result.camera = orientations_.camera;
+  result.lens_sigmas = StatedSigmas(std::nullopt, bundle_options_.lens, result.camera);
+  result.keyframes = std::move(result_.keyframes);
+  result.keyframe_tracks = std::move(result_.keyframe_tracks);
+  result.segments = {AllFramesAsSegment(
+      orientations_.graph, result.cam_from_world, options_.pure_rotation_segments)};
+  result.rotates_throughout = true;
+  return WithoutMap(std::move(result), {});
 }
 
 bool KeyframeMapBuilder::StaysThroughout() const {
@@ -249,7 +319,8 @@ void KeyframeMapBuilder::AdjustComponents() {
   refined_ = RefineComponents({keyframe_rotations_,
                                result_.krot.center_in_world,
                                result_.keyframe_tracks,
-                               result_.segments},
+                               result_.segments,
+                               SensorPriors(orientations_, result_.keyframes)},
                               result_.krot.component,
                               orientations_.camera,
                               bundle_options_,
@@ -276,6 +347,38 @@ void KeyframeMapBuilder::CorrectMaps() {
       rotslam::CorrectMaps(std::move(sources), options_.relocalisation, bundle_options_, refined_);
   result_.keyframes.insert(result_.relocalised.begin(), result_.relocalised.end());
   result_.camera = refined_.camera;
+}
+
+// The component that has refined the lens; null: none.
+const BundleResult* KeyframeMapBuilder::LargestBundle() const {
+  const auto largest =
+      std::max_element(refined_.bundles.begin(),
+                       refined_.bundles.end(),
+                       [](const BundleResult& a, const BundleResult& b) {
+                         return a.summary.num_observations < b.summary.num_observations;
+                       });
+  return largest == refined_.bundles.end() || !largest->Usable() ? nullptr : &*largest;
+}
+
+void KeyframeMapBuilder::StateSigmas() {
+  const BundleResult* largest = LargestBundle();
+  if (largest == nullptr) return;
+  result_.lens_sigmas =
+      StatedSigmas(largest->summary.lens_sigmas, bundle_options_.lens, result_.camera);
+}
+
+// Not of a lens that is estimated.
+void KeyframeMapBuilder::CheckCalibration() {
+  if (bundle_options_.lens.expected) return;
+  const BundleResult* largest = LargestBundle();
+  if (largest == nullptr) return;
+  std::set<FrameId> frames;
+  for (const auto& [frame, center] : largest->reconstruction.center_in_world) frames.insert(frame);
+  result_.calibration_check = rotslam::CheckCalibration(
+      largest->reconstruction,
+      WithBearingsOf(largest->camera, RestrictTracks(result_.keyframe_tracks, frames, 3)),
+      largest->camera,
+      bundle_options_);
 }
 
 void KeyframeMapBuilder::AlignComponents() {
@@ -322,16 +425,16 @@ std::optional<MapResult> KeyframeMapBuilder::PureRotationExplainsMore() const {
                                            options_.rotodom.relative_rotation)) {
     return std::nullopt;
   }
-  MapResult throughout =
-      PureRotationThroughout(result_, *rotation, orientations_, options_.rotodom.averaging);
+  MapResult throughout = PureRotationThroughout(result_, *rotation, orientations_, options_);
   observer_.OnEnd(SlamStage::kPureRotation, throughout);
   return throughout;
 }
 
 MapViews KeyframeMapBuilder::ReadViews(const Reconstruction& map,
                                        const std::set<FrameId>& frames) const {
-  MapViews views = ReadMapViews(
-      *images_, frames, [&](const std::string& problem) { observer_.OnMissingImage(problem); });
+  MapViews views = ReadMapViews(*images_, frames, orientations_, [&](const std::string& problem) {
+    observer_.OnMissingImage(problem);
+  });
   SetMotions(
       {orientations_, all_tracks_, orientations_.camera, options_.resection, options_.num_threads},
       map,
@@ -350,6 +453,28 @@ TrackCompletion KeyframeMapBuilder::CompletionByImages() const {
     SetMotionBlur(camera, RatesOf(orientations_), options_.ba.blur_s_per_px, tracks);
     return tracks;
   };
+}
+
+// The orientations through the lens that adjustment has found, as far as frames between keyframes
+// are compared with them.
+Orientations OrientationsThrough(const Camera& camera,
+                                 const Orientations& orientations,
+                                 const SlamOptions& options) {
+  Orientations seen;
+  seen.camera = camera;
+  seen.timestamps_s = orientations.timestamps_s;
+  seen.unconnected = orientations.unconnected;
+  seen.covariance = orientations.covariance;
+  seen.cam_from_world = orientations.cam_from_world;
+  seen.graph = TurnedThroughLens(orientations.graph, orientations.camera, camera);
+  for (const auto& [frame, rotation] : CloseLoops(seen.graph.edges(),
+                                                  orientations.cam_from_world,
+                                                  options.rotodom.averaging,
+                                                  options.num_threads)
+                                           .cam_from_world) {
+    seen.cam_from_world[frame] = rotation;
+  }
+  return seen;
 }
 
 // Null without images.
@@ -380,6 +505,10 @@ void RegisterRemainingFrames(const Orientations& orientations,
   std::set<FrameId> unknown = orientations.unconnected;
   std::erase_if(unknown, [&](FrameId frame) { return result.map.cam_from_world.contains(frame); });
   InterpolateUnknown(orientations, unknown, result.cam_from_world);
+  if (orientations.given) {
+    result.sensor_alignment = AlignmentWithMap(
+        *orientations.given, orientations.timestamps_s, result.cam_from_world, result.frame_poses);
+  }
   observer.OnEnd(SlamStage::kFrameRegistration, result);
 }
 
@@ -411,10 +540,12 @@ void MakeCloud(const std::vector<Track>& all_tracks,
 
 MapResult BuildKeyframeMap(const Orientations& orientations,
                            const SlamOptions& options,
-                           SlamObserver& observer) {
+                           SlamObserver& observer,
+                           int observations_per_frame) {
   observer.OnBegin(SlamStage::kTracks, -1);
-  return BuildKeyframeMapFrom(
-      orientations, TracksOf(orientations, options.ba.blur_s_per_px), options, nullptr, observer);
+  std::vector<Track> tracks = TracksOf(orientations, options.ba.blur_s_per_px);
+  if (observations_per_frame > 0) tracks = SomeTracks(std::move(tracks), observations_per_frame);
+  return BuildKeyframeMapFrom(orientations, tracks, options, nullptr, observer);
 }
 
 MapResult BuildMap(const Orientations& orientations,
@@ -424,9 +555,20 @@ MapResult BuildMap(const Orientations& orientations,
   observer.OnBegin(SlamStage::kTracks, -1);
   std::vector<Track> all_tracks = TracksOf(orientations, options.ba.blur_s_per_px);
   MapResult result = BuildKeyframeMapFrom(orientations, all_tracks, options, images, observer);
-  if (result.components.empty()) return result;
+  if (result.components.empty()) {
+    DescribeFramesWithoutMap(orientations, result);
+    return result;
+  }
   all_tracks = WithBearingsOf(result.camera, std::move(all_tracks));
-  RegisterRemainingFrames(orientations, all_tracks, options, observer, result);
+  // The lens of a calibration changes by less than orientations err.
+  if (options.ba.lens.expected && !orientations.given) {
+    const Orientations seen = OrientationsThrough(result.camera, orientations, options);
+    result.cam_from_world = FollowAnchors(
+        seen.graph, seen.cam_from_world, result.map.cam_from_world, options.rotodom.averaging);
+    RegisterRemainingFrames(seen, all_tracks, options, observer, result);
+  } else {
+    RegisterRemainingFrames(orientations, all_tracks, options, observer, result);
+  }
   MakeCloud(all_tracks, options, observer, result);
   return result;
 }

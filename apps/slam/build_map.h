@@ -1,6 +1,6 @@
 #pragma once
 
-#include "apps/slam/frame_source.h"
+#include "apps/slam/input/frame_source.h"
 #include "apps/slam/map_result.h"
 #include "apps/slam/observer.h"
 #include "apps/slam/options.h"
@@ -27,6 +27,7 @@ MapResult BuildMap(const Orientations& orientations,
 /// the keyframes. The result has no cloud and no positions of the frames between keyframes.
 MapResult BuildKeyframeMap(const Orientations& orientations,
                            const SlamOptions& options,
-                           SlamObserver& observer);
+                           SlamObserver& observer,
+                           int observations_per_frame = 0);
 
 }  // namespace rotslam

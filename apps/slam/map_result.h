@@ -1,13 +1,17 @@
 #pragma once
 
 #include <map>
+#include <optional>
 #include <set>
 #include <string>
 #include <vector>
 
+#include "apps/slam/map/calibration_check.h"
+#include "apps/slam/map/frame_pose.h"
 #include "apps/slam/map/refinement.h"
 #include "ba/bundle_adjustment.h"
 #include "krot/known_rotation.h"
+#include "rotodom/sensor_orientations/sensor_types.h"
 #include "rotodom/types/maps.h"
 #include "rotodom/types/pure_rotation_segment.h"
 #include "rotodom/types/reconstruction.h"
@@ -16,19 +20,25 @@ namespace rotslam {
 
 /// Positions and points, and how they were found.
 struct MapResult {
-  RotationMap cam_from_world;  // of every frame
-  CenterMap center_in_world;   // of every frame
-  Reconstruction map;          // refined keyframes, points and their tracks
-  Reconstruction cloud;        // every frame, and the points of all tracks with enough parallax
-  Camera camera;               // as the map's largest component has refined it
+  RotationMap cam_from_world;                // of every frame
+  CenterMap center_in_world;                 // of every frame
+  std::map<FrameId, FramePose> frame_poses;  // of every frame: how its pose was found
+  Reconstruction map;                        // refined keyframes, points and their tracks
+  Reconstruction cloud;    // every frame, and the points of all tracks with enough parallax
+  Camera camera;           // as the map's largest component has refined it
+  LensSigmas lens_sigmas;  // of `camera`, see StatedSigmas
+  CalibrationCheck calibration_check;  // of the largest component
   std::set<FrameId> keyframes;
   std::vector<Track> keyframe_tracks;  // input of the known-rotation problem
   std::vector<PureRotationSegment> segments;
   std::vector<MapComponent> components;  // by their first keyframe
   KrotSolution krot;
+  MapBracket final_bracket;  // of what bundle adjustment keeps, with its rotations
   std::map<FrameId, PoseCovariance> pose_covariance;  // of refined keyframes, where asked for
   std::vector<BundleSummary> bundles;                 // one per component
-  std::set<FrameId> relocalised;                      // keyframes that the map correction moved
+  // Of given orientations against those of the map, which drift less than the first ones.
+  std::optional<SensorAlignment> sensor_alignment;
+  std::set<FrameId> relocalised;  // keyframes that the map correction moved
   // Observations explained by rotations alone, where the camera rotates throughout and the
   // calibration was changed to show that; else zero.
   int num_rotation_observations = 0;

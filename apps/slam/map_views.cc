@@ -32,11 +32,17 @@ void SetTurnsWhileExposed(const Orientations& orientations, MapViews& views) {
 
 MapViews ReadMapViews(ImageProvider& images,
                       const std::set<FrameId>& frames,
+                      const Orientations& orientations,
                       const std::function<void(const std::string& problem)>& tell) {
   MapViews views;
   images.Read(
       frames,
-      [&](FrameId frame, const cv::Mat& image) { views[frame] = MakeMapView(image); },
+      [&](FrameId frame, const cv::Mat& image) {
+        const FrameMasks& masks = orientations.masks;
+        views[frame] = masks.IsEmpty()
+                           ? MakeMapView(image)
+                           : MakeMapView({image, masks.Of(orientations.image_names[frame.value])});
+      },
       tell);
   return views;
 }
@@ -91,7 +97,7 @@ std::map<FrameId, Features> DescribeViews(const MapViews& views,
   std::map<FrameId, Features> described;
   for (const auto& [frame, view] : views) {
     Features& corners = described[frame];
-    corners = ExtractFeatures(view.image, frame, camera, options, num_threads);
+    corners = ExtractFeatures({view.image, view.mask}, frame, camera, options, num_threads);
     corners.rgb = {};
     MoveToMidFrame(camera, view.motion, corners);
   }

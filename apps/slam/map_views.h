@@ -5,7 +5,7 @@
 #include <set>
 #include <string>
 
-#include "apps/slam/frame_source.h"
+#include "apps/slam/input/frame_source.h"
 #include "apps/slam/orientations.h"
 #include "ba/resection.h"
 #include "rotodom/features/features.h"
@@ -13,10 +13,11 @@
 
 namespace rotslam {
 
-/// Reads the images of `frames` again and makes views of them.
+/// Reads the images of `frames` again and makes views of them, with the masks of `orientations`.
 /// @param tell  receives one line for each image that cannot be read again; the result lacks these.
 MapViews ReadMapViews(ImageProvider& images,
                       const std::set<FrameId>& frames,
+                      const Orientations& orientations,
                       const std::function<void(const std::string& problem)>& tell);
 
 /// Inputs from which the motion of the camera during a frame is estimated.

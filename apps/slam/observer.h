@@ -2,7 +2,9 @@
 
 #include <string>
 
+#include "rotodom/camera/camera.h"
 #include "rotodom/loop/looped_odometry.h"
+#include "rotodom/masks/static_content.h"
 #include "rotodom/rolling_shutter/readout.h"
 #include "rotodom/sequence/sequence.h"
 
@@ -41,10 +43,14 @@ class SlamObserver {
   virtual void OnFrame(const FrameProgress& /*progress*/) {}
   /// The readout was estimated from the images. The first stage starts again with it.
   virtual void OnReadoutFound(const ReadoutEstimate& /*readout*/) {}
+  /// Static content was found. On the picture it is masked and the first stage starts again; a
+  /// camera that stands is told after the last frame.
+  virtual void OnStaticContent(const StaticContent& /*content*/) {}
   /// The image of a frame of the map cannot be read again; no points are looked for in it.
   virtual void OnMissingImage(const std::string& /*problem*/) {}
-  /// Pass `pass` (from 1) over the beginning of the sequence starts, to estimate the focal length.
-  virtual void OnFocalPass(int /*pass*/, double /*focal_px*/) {}
+  /// Round `round` of the estimate of an unknown lens starts from `camera`. Round 0 tracks the
+  /// beginning of the sequence, the others adjust its map.
+  virtual void OnLensRound(int /*round*/, const Camera& /*camera*/) {}
 
   /// The first stage has ended; some fields of `orientations` are the results of later stages.
   virtual void OnEnd(SlamStage /*stage*/, const Orientations& /*orientations*/) {}

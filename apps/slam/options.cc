@@ -10,6 +10,9 @@ std::optional<std::string> ReadoutOptions::Problem() const {
 }
 
 std::optional<std::string> SlamOptions::Problem() const {
+  if (max_image_side_px < 64) {
+    return OutOfRange("max_image_side_px", max_image_side_px, "64 or more");
+  }
   if (auto problem = ProblemIn("rotodom", rotodom)) return problem;
   if (auto problem = ProblemIn("readout", readout)) return problem;
   if (auto problem = ProblemIn("loop", loop)) return problem;

@@ -36,6 +36,9 @@ struct ReadoutOptions {
 
 /// Options of the whole system, stage by stage. The defaults suit real sequences.
 struct SlamOptions {
+  // Images whose longer side is larger are reduced to at most this before anything is looked for in
+  // them (WorkingSize): less keeps fewer details and takes less time.
+  int max_image_side_px = 1600;
   OdometryOptions rotodom;
   ReadoutOptions readout;
   LoopOptions loop;
@@ -58,6 +61,7 @@ struct SlamOptions {
 
   template <class Visitor>
   void Visit(Visitor&& visit) {
+    visit("max_image_side_px", max_image_side_px);
     visit("rotodom", rotodom);
     visit("readout", readout);
     visit("loop", loop);

@@ -7,12 +7,17 @@
 #include <string>
 #include <vector>
 
-#include "apps/slam/frame_log.h"
-#include "apps/slam/frame_source.h"
-#include "apps/slam/given_rotations.h"
+#include "apps/slam/input/frame_log.h"
+#include "apps/slam/input/frame_source.h"
+#include "apps/slam/input/given_rotations.h"
+#include "apps/slam/masks/frame_masks.h"
 #include "apps/slam/observer.h"
 #include "apps/slam/options.h"
 #include "rotodom/loop/looped_odometry.h"
+#include "rotodom/masks/static_content.h"
+#include "rotodom/sequence/frame_thumbnail.h"
+#include "rotodom/view_graph/fisheye_check.h"
+#include "rotodom/view_graph/zoom_check.h"
 
 namespace rotslam {
 
@@ -21,10 +26,17 @@ struct Orientations : OdometryResult {
   bool interrupted = false;                // the observer asked to stop before the sequence's end
   Camera camera;                           // as given, with the readout estimated from the images
   std::optional<ReadoutEstimate> readout;  // set: it was estimated from the images
+  FrameMasks masks;                        // as given, with the static content found
+  StaticContent static_content;            // parts of the picture that never move
   std::vector<double> timestamps_s;        // by frame id
   std::vector<std::string> image_names;    // by frame id
-  // Set: `cam_from_world` and `covariance` are the given ones, and the images yield only the edges.
+  std::vector<FrameThumbnail> thumbnails;  // by frame id
+  FisheyeCheck fisheye;                    // whether the lens is another one than the calibration's
+  std::vector<Zoom> zooms;                 // where the focal length changes
+  // Set: `cam_from_world` and `covariance` are those of images and given orientations together.
   std::optional<GivenRotations> given;
+  // Pixels of the images that were worked with per pixel of the original ones, see WorkingSize.
+  double working_scale = 1.0;
   int num_unreadable = 0;
   std::set<FrameId> unconnected;  // without an edge; their orientations are interpolated, or given
   int num_weak = 0;
@@ -43,6 +55,10 @@ struct Orientations : OdometryResult {
   std::vector<FrameReport> reports;     // by frame id
   std::map<FrameId, int> inlier_edges;  // edges that agree with the frame's orientation
 
+  /// Whether the camera stands from the first frame to the last while things move in front of it:
+  /// the orientations are all the same, and there are no matches.
+  bool CameraStands() const { return static_content.kind == StaticContentKind::kStanding; }
+
   /// Whether there are enough frames and edges for orientations; false only when interrupted.
   bool IsUsable() const { return timestamps_s.size() >= 3 && !graph.edges().empty(); }
 };
@@ -51,27 +67,20 @@ struct Orientations : OdometryResult {
 struct OrientationInputs {
   std::shared_ptr<const Vocabulary> vocabulary;  // null: the one that comes with the library
   bool keep_features = true;                     // for the map
-  // Set: these replace the orientations estimated from the images.
+  // Set: these are put together with the orientations estimated from the images.
   std::optional<OrientationsFromElsewhere> given;
   FrameLog* log = nullptr;  // null: nothing is recorded
+  FrameMasks masks;         // what is to be ignored
+  // Off: static content on the picture is tracked like the scene.
+  bool find_static_content = true;
+  StaticContent static_content;  // found before
+  // Ask the images whether the calibration is theirs (Orientations::fisheye, zooms).
+  bool check_lens = true;
 };
 
-/// Reads all frames and estimates their orientations. A frame without matches gets the orientation
-/// interpolated in time between the nearest frames that have one. Where the calibration does not
-/// give the readout and the images show a rolling shutter, tracking starts again from the first
-/// frame.
-/// Throws std::runtime_error when there are fewer than three frames or no two of them match, and
-/// what MatchGivenRotations throws; std::invalid_argument when an option is out of range.
-/// @return  incomplete, possibly without a single edge, when the observer has stopped it
-///          (IsUsable()).
-Orientations FindOrientations(FrameSource& frames,
-                              const Camera& camera,
-                              const SlamOptions& options,
-                              const OrientationInputs& inputs,
-                              SlamObserver& observer);
-
 /// Interpolates the orientation of the frames in `unknown` in time between the nearest other
-/// frames. Call it again once those have been refined. Given orientations are not changed.
+/// frames. Call it again once those have been refined. Frames with given orientations keep these,
+/// rotated as the frames beside them were.
 void InterpolateUnknown(const Orientations& orientations,
                         const std::set<FrameId>& unknown,
                         RotationMap& cam_from_world);
@@ -79,6 +88,13 @@ void InterpolateUnknown(const Orientations& orientations,
 /// Standard deviation of every orientation whose covariance is known, rad, relative to the first
 /// frame: the root of the mean variance about the three axes.
 std::map<FrameId, double> OrientationSigmas(const Orientations& orientations);
+
+/// Deviations of keyframes' orientations that a sensor ties to its own, rad, as priors for bundle
+/// adjustment: what the errors of all have in common counted in, and in the ratio to keypoints of
+/// one pixel that they have to the noise of the edges' matches. Empty without given orientations,
+/// and where these drift more than the images.
+std::map<FrameId, double> SensorPriors(const Orientations& orientations,
+                                       const std::set<FrameId>& keyframes);
 
 /// Scale error of all rotations, from loops along which the camera turned right round: the median
 /// of true angle over measured angle. 1 where there is no such loop.

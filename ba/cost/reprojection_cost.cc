@@ -1,11 +1,13 @@
 #include "ba/cost/reprojection_cost.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 
 #include <Eigen/Geometry>
 
 #include "ba/cost/loss.h"
+#include "rotodom/camera/lens_parameters.h"
 
 namespace rotslam {
 namespace {
@@ -29,11 +31,12 @@ struct Blocks {
   double* J_turn = nullptr;
   double* J_center = nullptr;
   double* J_point = nullptr;
-  double* J_lens = nullptr;
+  std::array<double*, 2> J_lens = {};
   int camera_stride = 3;
 
   bool WantJacobians() const {
-    return J_turn != nullptr || J_center != nullptr || J_point != nullptr || J_lens != nullptr;
+    return J_turn != nullptr || J_center != nullptr || J_point != nullptr || J_lens[0] != nullptr ||
+           J_lens[1] != nullptr;
   }
 };
 
@@ -60,9 +63,9 @@ Blocks BlocksOf(const ObservationForm& form, double const* const* parameters, do
   }
   blocks.J_point = jacobian();
   blocks.point = parameters[next];
-  if (form.moves_lens) {
+  for (int k = 0; k < form.num_lens_blocks; ++k) {
     ++next;
-    blocks.J_lens = jacobian();
+    blocks.J_lens[k] = jacobian();
   }
   return blocks;
 }
@@ -118,7 +121,7 @@ ReprojectionCost::ReprojectionCost(const ReprojectionState& state,
       form_(form) {
   set_num_residuals(2);
   std::vector<std::int32_t>& sizes = *mutable_parameter_block_sizes();
-  sizes.reserve(4);
+  sizes.reserve(5);
   if (form.camera == CameraLayout::kPose) {
     sizes.push_back(kPoseSize);
   } else {
@@ -126,7 +129,7 @@ ReprojectionCost::ReprojectionCost(const ReprojectionState& state,
     if (!form.at_infinity) sizes.push_back(3);
   }
   sizes.push_back(3);
-  if (form.moves_lens) sizes.push_back(6);
+  for (int k = 0; k < form.num_lens_blocks; ++k) sizes.push_back(kLensBlockSize);
 }
 
 bool ReprojectionCost::Evaluate(double const* const* parameters,
@@ -164,15 +167,18 @@ bool ReprojectionCost::Evaluate(double const* const* parameters,
     ColumnsOf<3>(blocks.J_center, blocks.camera_stride).noalias() = weight * J.by_center;
   }
   if (blocks.J_point != nullptr) ColumnsOf<3>(blocks.J_point, 3).noalias() = weight * J.by_point;
-  if (blocks.J_lens != nullptr) {
-    auto J_lens = ColumnsOf<6>(blocks.J_lens, 6);
+  if (blocks.J_lens[0] != nullptr || blocks.J_lens[1] != nullptr) {
+    Eigen::Matrix<double, 2, kLensSize> J_lens = Eigen::Matrix<double, 2, kLensSize>::Zero();
     if (pixel) {
       J_lens.noalias() = weight * LensJacobian(state_.camera,
                                                state_.calibrated,
                                                state_.rotation.Matrix() * (point - center),
                                                *pixel);
-    } else {
-      J_lens.setZero();
+    }
+    for (int k = 0; k < form_.num_lens_blocks; ++k) {
+      if (blocks.J_lens[k] == nullptr) continue;
+      ColumnsOf<kLensBlockSize>(blocks.J_lens[k], kLensBlockSize) =
+          J_lens.middleCols<kLensBlockSize>(k * kLensBlockSize);
     }
   }
   return true;

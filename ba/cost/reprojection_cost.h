@@ -5,7 +5,6 @@
 #include <Eigen/Core>
 #include <ceres/cost_function.h>
 
-#include "ba/cost/lens.h"
 #include "rotodom/camera/camera.h"
 #include "rotodom/types/rotation.h"
 
@@ -68,15 +67,16 @@ enum class CameraLayout {
   kCenter,  // centre (3); the rotation is held
 };
 
-/// Which parameter blocks an observation has: those of the camera, the point (3), the lens.
+/// Which parameter blocks an observation has: those of the camera, the point (3), the lens (6
+/// each).
 struct ObservationForm {
   CameraLayout camera = CameraLayout::kPose;
   // The point lies in a direction of any length, without depth: the centre does not count, and has
   // no block where it comes apart. Such tracks are seen from one place only, but tell how the
   // camera turned. Not with kCenter, where they have nothing to say.
   bool at_infinity = false;
-  // LensParameters (6) come last.
-  bool moves_lens = false;
+  // Blocks of LensParameters come last: none, the first, or both.
+  int num_lens_blocks = 0;
 };
 
 /// What a caller adds to a point between evaluations.

@@ -68,23 +68,29 @@ std::optional<CameraCovariances> FindCovariances(const Camera& calibrated,
   }
   std::vector<double*> moving = AllMovingBlocks(state, adjustment);
   std::vector<std::vector<double*>> groups;
-  groups.reserve(state.frames.size() + 1);
-  for (std::size_t k = 0; k < state.frames.size(); ++k) {
+  groups.reserve(state.frames.size() + 2);
+  for (std::size_t k = 0; options.find_covariance && k < state.frames.size(); ++k) {
     groups.push_back(MovingBlocks(k, state, adjustment));
   }
-  if (refine_lens) {
-    moving.push_back(cameras.Lens());
-    groups.push_back({cameras.Lens()});
+  const std::size_t num_poses = groups.size();
+  const int num_lens_blocks = refine_lens ? options.lens.NumBlocks() : 0;
+  for (int k = 0; k < num_lens_blocks; ++k) {
+    moving.push_back(cameras.Lens() + k * kLensBlockSize);
+    groups.push_back({moving.back()});
   }
   const auto found = MarginalCovariances(problem, points, moving, groups);
   if (!found) return std::nullopt;
   CameraCovariances covariances;
   covariances.poses.resize(state.frames.size());
-  for (std::size_t k = 0; k < state.frames.size(); ++k) {
+  for (std::size_t k = 0; k < num_poses; ++k) {
     if (!adjustment.IsUsed(k)) continue;
     covariances.poses[k] = OfPose((*found)[k], adjustment.Moves(cameras.Turn(k)));
   }
-  if (refine_lens) covariances.lens = found->back();
+  if (num_lens_blocks > 0) covariances.lens_variances = LensParameters::Zero();
+  for (int k = 0; k < num_lens_blocks; ++k) {
+    covariances.lens_variances->segment<kLensBlockSize>(k * kLensBlockSize) =
+        (*found)[num_poses + k].diagonal();
+  }
   return covariances;
 }
 

@@ -9,13 +9,14 @@
 #include "ba/types/bundle_options.h"
 #include "ba/types/bundle_result.h"
 #include "rotodom/camera/camera.h"
+#include "rotodom/camera/lens_parameters.h"
 
 namespace rotslam {
 
 /// How well a minimum is known where nothing outside the state is: see BundleResult.
 struct CameraCovariances {
   std::vector<std::optional<PoseCovariance>> poses;  // by frame of the state; nullopt: not in it
-  std::optional<Eigen::Matrix<double, 6, 6>> lens;   // of LensParameters
+  std::optional<LensParameters> lens_variances;      // zero for blocks that are held
 };
 
 /// Covariances of the cameras at the minimum that `state` is; the arguments are Minimise's.

@@ -91,7 +91,8 @@ class Classifier {
         max_error_px_(round.max_error_px),
         max_residual_(round.max_residual),
         loss_(MakeLoss(round)),
-        min_angle_rad_(options.min_angle_deg * kRadFromDeg) {}
+        min_angle_rad_(options.min_angle_deg * kRadFromDeg),
+        min_track_observations_(options.min_track_observations) {}
 
   // Marks the observations that the track's position, or else a better one downhill from it,
   // explains; anywhere, those that the best of all positions does.
@@ -124,7 +125,7 @@ class Classifier {
       one.used = fits[k] && !state_.frames[one.frame].weak;
       count += one.used ? 1 : 0;
     }
-    const bool enough = count >= kMinTrackObservations && (track.one_place || IsDeep(track));
+    const bool enough = count >= min_track_observations_ && (track.one_place || IsDeep(track));
     track.kind = !enough           ? TrackKind::kOut
                  : track.one_place ? TrackKind::kDirection
                                    : TrackKind::kPoint;
@@ -309,6 +310,7 @@ class Classifier {
   double max_residual_;  // zero: as the former, in sigmas
   std::unique_ptr<ceres::LossFunction> loss_;
   double min_angle_rad_;
+  int min_track_observations_;
 };
 
 // Takes frames out that are left with too few observations, then tracks that lose theirs, until

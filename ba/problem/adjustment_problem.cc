@@ -11,7 +11,7 @@ namespace {
 // Weight of the scale anchor: a share of 1e-4 of the scale costs as much as one sigma. The optimum
 // does not depend on it.
 constexpr double kScaleAnchorWeight = 1e4;
-// Of a part of the lens that does not move.
+// Standard deviation of a lens parameter that is held.
 constexpr double kHeldSigma = 1e-7;
 
 ceres::Problem::Options ProblemOptions(Followers& followers) {
@@ -36,6 +36,7 @@ AdjustmentProblem::AdjustmentProblem(const Camera& calibrated,
       refine_lens_(refine_lens),
       state_(state),
       huber_bend_(round.loss == RobustLoss::kHuber ? round.loss_scale : 0.0),
+      num_lens_blocks_(refine_lens ? options.lens.NumBlocks() : 0),
       loss_(huber_bend_ > 0.0 ? nullptr : MakeLoss(round)),
       cameras_(state, calibrated, refine_rotations_),
       strays_(state, options.min_angle_deg * kRadFromDeg, options.num_threads),
@@ -46,6 +47,7 @@ AdjustmentProblem::AdjustmentProblem(const Camera& calibrated,
   ordering_ = std::make_shared<ceres::ParameterBlockOrdering>();
   AddResiduals();
   if (Empty()) return;
+  AddRotationPriors();
   FixGauge();
   if (refine_lens_) FreeLens(options.lens);
 }
@@ -89,19 +91,21 @@ void AdjustmentProblem::AddObservation(TrackState& track,
   ObservationForm form;
   form.camera = cameras_.layout();
   form.at_infinity = track.kind == TrackKind::kDirection;
-  form.moves_lens = refine_lens_;
+  form.num_lens_blocks = num_lens_blocks_;
   costs_.emplace_back(
       ReprojectionState{cameras_.camera(), calibrated_, cameras_.RotationOf(one.frame), shift},
       observation.keypoint_px,
       ScaleOf(state_, one),
       huber_bend_,
       form);
-  std::array<double*, 4> blocks;
+  std::array<double*, 5> blocks;
   int num_blocks = 0;
   if (refine_rotations_) blocks[num_blocks++] = cameras_.Turn(one.frame);
   if (!JointPoses() && !form.at_infinity) blocks[num_blocks++] = cameras_.Center(frame.center);
   blocks[num_blocks++] = track.position.data();
-  if (form.moves_lens) blocks[num_blocks++] = cameras_.Lens();
+  for (int k = 0; k < num_lens_blocks_; ++k) {
+    blocks[num_blocks++] = cameras_.Lens() + k * kLensBlockSize;
+  }
   problem_.AddResidualBlock(&costs_.back(), loss_.get(), blocks.data(), num_blocks);
   frame_used_[one.frame] = true;
   if (!form.at_infinity) center_used_[frame.center] = true;
@@ -109,17 +113,31 @@ void AdjustmentProblem::AddObservation(TrackState& track,
   ++counts_.num_observations;
 }
 
+void AdjustmentProblem::AddRotationPriors() {
+  if (!refine_rotations_) return;
+  for (std::size_t k = 0; k < state_.frames.size(); ++k) {
+    const FrameState& frame = state_.frames[k];
+    if (!frame_used_[k] || frame.fixed || !(frame.prior_sigma_rad > 0.0)) continue;
+    rotation_priors_.emplace_back(
+        frame.cam_from_world, frame.prior_cam_from_world, frame.prior_sigma_rad);
+    problem_.AddResidualBlock(&rotation_priors_.back(), nullptr, cameras_.Turn(k));
+  }
+}
+
 // What is held is held by a tight prior: a block of another size would leave Ceres' specialised
 // elimination.
 void AdjustmentProblem::FreeLens(const LensOptions& options) {
-  const double focal = options.refine_focal ? options.focal_sigma : kHeldSigma;
-  const double center = options.refine_principal_point ? options.principal_sigma : kHeldSigma;
-  const double bend = options.refine_distortion ? options.distortion_sigma : kHeldSigma;
-  LensParameters sigmas;
-  sigmas << focal, kHeldSigma, center, center, bend, bend;
-  lens_prior_ = std::make_unique<LensPriorCost>(LensOf(calibrated_, calibrated_), sigmas);
-  problem_.AddResidualBlock(lens_prior_.get(), nullptr, cameras_.Lens());
-  ordering_->AddElementToGroup(cameras_.Lens(), 1);
+  LensParameters sigmas = options.Sigmas(calibrated_.model);
+  for (double& sigma : sigmas) sigma = std::max(sigma, kHeldSigma);
+  const LensParameters expected = LensOf(options.expected.value_or(calibrated_), calibrated_);
+  for (int k = 0; k < num_lens_blocks_; ++k) {
+    const int first = k * kLensBlockSize;
+    lens_priors_.push_back(std::make_unique<LensPriorCost>(expected.segment<kLensBlockSize>(first),
+                                                           sigmas.segment<kLensBlockSize>(first)));
+    double* const block = cameras_.Lens() + first;
+    problem_.AddResidualBlock(lens_priors_.back().get(), nullptr, block);
+    ordering_->AddElementToGroup(block, 1);
+  }
   cameras_.FreeLens();
 }
 
@@ -163,7 +181,8 @@ int AdjustmentProblem::HoldFirstFrame() {
   }
   for (std::size_t k = 0; k < state_.frames.size(); ++k) {
     if (!frame_used_[k] || !used(k)) continue;
-    HoldTurn(k);
+    // Priors hold the orientation of all.
+    if (rotation_priors_.empty()) HoldTurn(k);
     if (!has_points) return -1;
     problem_.SetParameterBlockConstant(cameras_.BlockOfCenter(state_.frames[k].center));
     return state_.frames[k].center;
@@ -198,14 +217,13 @@ void AdjustmentProblem::TakeCameras() {
   }
 }
 
+// What was held keeps its last bit.
 void AdjustmentProblem::TakeLens(const LensOptions& options, int num_threads) {
   LensParameters lens = LensParameters::Map(cameras_.Lens());
   if (!refine_lens_ || !lens.allFinite()) return;
   const LensParameters given = LensOf(calibrated_, calibrated_);
-  lens[1] = given[1];
-  if (!options.refine_focal) lens[0] = given[0];
-  if (!options.refine_principal_point) lens.segment<2>(2) = given.segment<2>(2);
-  if (!options.refine_distortion) lens.tail<2>() = given.tail<2>();
+  const LensParameters sigmas = options.Sigmas(calibrated_.model);
+  lens = (sigmas.array() > 0.0).select(lens, given);
   SetCamera(WithLens(calibrated_, lens), num_threads, state_);
 }
 

@@ -12,8 +12,9 @@
 #include <ceres/ordered_groups.h>
 #include <ceres/problem.h>
 
-#include "ba/cost/lens.h"
+#include "ba/cost/lens_prior.h"
 #include "ba/cost/reprojection_cost.h"
+#include "ba/cost/rotation_prior.h"
 #include "ba/problem/bundle_state.h"
 #include "ba/problem/camera_blocks.h"
 #include "ba/problem/stray_points.h"
@@ -93,6 +94,7 @@ class AdjustmentProblem {
   bool JointPoses() const { return cameras_.layout() == CameraLayout::kPose; }
   void AddResiduals();
   void AddObservation(TrackState& track, const PointShift& shift, const ObservationState& one);
+  void AddRotationPriors();
   void FreeLens(const LensOptions& options);
   void FixGauge();
   void HoldTurn(std::size_t frame);
@@ -105,12 +107,14 @@ class AdjustmentProblem {
   const bool refine_rotations_;
   const bool refine_lens_;
   BundleState& state_;
-  const double huber_bend_;                    // 0: another loss
+  const double huber_bend_;  // 0: another loss
+  const int num_lens_blocks_;
   std::unique_ptr<ceres::LossFunction> loss_;  // null: Huber's, or none
   // One piece for all: they come and go together.
   std::pmr::monotonic_buffer_resource memory_of_costs_;
   std::pmr::deque<ReprojectionCost> costs_{&memory_of_costs_};
-  std::unique_ptr<LensPriorCost> lens_prior_;
+  std::vector<std::unique_ptr<LensPriorCost>> lens_priors_;
+  std::deque<RotationPriorCost> rotation_priors_;
   std::unique_ptr<ScaleAnchorCost> anchor_;
   CameraBlocks cameras_;
   StrayPoints strays_;

@@ -54,6 +54,12 @@ void CheckContract(const BundleProblem& problem, const BundleOptions& options) {
       Refuse("fixed frame " + std::to_string(frame.value) + " has no pose");
     }
   }
+  for (const auto& [frame, sigma_rad] : problem.rotation_sigma_rad) {
+    if (!(sigma_rad > 0.0) || !std::isfinite(sigma_rad)) {
+      Refuse("the orientation's sigma of frame " + std::to_string(frame.value) +
+             " must be positive");
+    }
+  }
   for (const auto& [frame, other] : problem.shared_center) {
     if (!has_pose(frame) || !has_pose(other)) {
       Refuse("frame " + std::to_string((has_pose(frame) ? other : frame).value) +
@@ -129,6 +135,11 @@ BundleState MakeBundleState(const BundleProblem& problem, const BundleOptions& o
     frame.cam_from_world = cam_from_world;
     frame.center = center->second;
     frame.fixed = problem.fixed_frames.contains(id);
+    const auto prior = problem.rotation_sigma_rad.find(id);
+    if (prior != problem.rotation_sigma_rad.end()) {
+      frame.prior_sigma_rad = prior->second;
+      frame.prior_cam_from_world = cam_from_world;
+    }
     state.frames.push_back(frame);
   }
   const FrameIndex frame_index = IndexFrames(state);

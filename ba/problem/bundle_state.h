@@ -21,7 +21,10 @@ struct FrameState {
   Rotation cam_from_world;
   int center = 0;      // index of its centre; frames that stand at one place share it
   bool fixed = false;  // pose held by the caller
-  bool weak = false;   // too few observations to be in the last round
+  // Of what is known of its orientation beforehand; 0: nothing.
+  double prior_sigma_rad = 0.0;
+  Rotation prior_cam_from_world;
+  bool weak = false;  // too few observations to be in the last round
 };
 
 enum class TrackKind { kOut, kPoint, kDirection };

@@ -5,6 +5,13 @@
 namespace rotslam {
 namespace {
 
+// Whether some frame has a prior of its orientation.
+bool HasPriors(const BundleState& state) {
+  return std::any_of(state.frames.begin(), state.frames.end(), [](const FrameState& frame) {
+    return frame.prior_sigma_rad > 0.0;
+  });
+}
+
 // Whether some frames stand at one place.
 bool SharesCenters(const BundleState& state) {
   std::vector<bool> taken(state.centers.size(), false);
@@ -18,9 +25,10 @@ bool SharesCenters(const BundleState& state) {
 }  // namespace
 
 CameraBlocks::CameraBlocks(const BundleState& state, const Camera& calibrated, bool turns)
-    : layout_(!turns                 ? CameraLayout::kCenter
-              : SharesCenters(state) ? CameraLayout::kApart
-                                     : CameraLayout::kPose),
+    : layout_(!turns ? CameraLayout::kCenter
+              // With priors one centre is held whose orientation is not.
+              : SharesCenters(state) || HasPriors(state) ? CameraLayout::kApart
+                                                         : CameraLayout::kPose),
       num_centers_(state.centers.size()),
       frame_of_center_(state.centers.size(), 0),
       numbers_(3 * state.centers.size() + (turns ? 3 * state.frames.size() : 0) + kLensSize),

@@ -5,10 +5,10 @@
 
 #include <Eigen/Core>
 
-#include "ba/cost/lens.h"
 #include "ba/cost/reprojection_cost.h"
 #include "ba/problem/bundle_state.h"
 #include "ba/problem/stray_points.h"
+#include "rotodom/camera/lens_parameters.h"
 
 namespace rotslam {
 
@@ -38,6 +38,7 @@ class CameraBlocks {
   }
   /// As of the last evaluation.
   std::vector<StrayPoints::Pose> Poses(const BundleState& state);
+  /// LensParameters: two blocks of kLensBlockSize.
   double* Lens() { return &numbers_[numbers_.size() - kLensSize]; }
   void FreeLens() { moves_lens_ = true; }
 
@@ -48,8 +49,6 @@ class CameraBlocks {
   Rotation Turned(std::size_t frame) { return rotations_[frame].At(TurnOf(frame)); }
 
  private:
-  static constexpr std::size_t kLensSize = LensParameters::SizeAtCompileTime;
-
   Eigen::Vector3d TurnOf(std::size_t frame) { return Eigen::Vector3d::Map(Turn(frame)); }
 
   CameraLayout layout_;

@@ -3,10 +3,12 @@
 #include <optional>
 #include <string>
 
+#include "rotodom/camera/lens_parameters.h"
+
 namespace rotslam {
 
-/// A track with fewer fitting observations is dropped. Two views always agree along the epipolar
-/// line, so two say nothing about the match; three do.
+/// A track with fewer fitting observations is dropped by default. Two views always agree along the
+/// epipolar line, so two say nothing about the match; three do.
 inline constexpr int kMinTrackObservations = 3;
 /// A frame with fewer fitting observations is left out of a round: six unknowns on a handful of
 /// points follow any outlier. Twelve give four numbers for each unknown.
@@ -52,13 +54,15 @@ struct BundleRound {
 /// lens' distortion bends every track alike, and a long drive turns that into a drift of scale that
 /// no number of observations averages out.
 struct LensOptions {
-  // The first two radial coefficients, or w of kFov; a pinhole camera becomes a radtan one.
+  // The first two radial coefficients, or w of kFov; a pinhole becomes a radtan camera.
   bool refine_distortion = true;
   // Off: along a path the focal length trades with positions, and on EuRoC, whose calibration is
   // good, it moves by 1.2 % to make up for wrong matches.
   bool refine_focal = false;
   // Off: hardly told from a turn of the camera.
   bool refine_principal_point = false;
+  // Off: the coefficients beyond the first two, which a calibration gives better than a sequence.
+  bool refine_higher_terms = false;
   // Standard deviation of each radial coefficient given, and of the focal length given, as a share
   // of it. They count as one observation each among thousands that err alike, so they are tighter
   // than a calibration deserves.
@@ -66,6 +70,14 @@ struct LensOptions {
   double focal_sigma = 0.003;
   // Of the principal point, in focal lengths.
   double principal_sigma = 0.003;
+  // Of the tangential coefficients, as a share of that of the others: they trade with the principal
+  // point, and lenses are centred to some seconds of arc.
+  double tangential_share = 0.1;
+  // What the parameters are expected to be; none: those of the camera that adjustment starts from.
+  std::optional<Camera> expected;
+  // Standard deviations of the parameters of this very camera, in place of those above and of what
+  // they free; 0: held.
+  std::optional<LensParameters> given_sigmas;
   // The calibration stands unless another lens takes this share off the cost. Errors of
   // neighbouring observations are alike, so that some lens always gains a little: 0.0002 to 0.001
   // on simulated walks and drives, whose calibration is exact. Distortion of a hundredth is worth
@@ -73,6 +85,13 @@ struct LensOptions {
   // at half its resolution 0.0016 (position error 0.3 m instead of 0.9); EuRoC and TUM fr1 0.003,
   // where it makes no difference.
   double min_gain = 0.001;
+
+  /// Standard deviations of the parameters given; 0: the parameter is held.
+  LensParameters Sigmas(CameraModel model) const;
+  /// Whether any parameter moves.
+  bool RefinesAny() const { return NumBlocks() > 0; }
+  /// Blocks of LensParameters that have parameters that move, from the first.
+  int NumBlocks() const;
 
   std::optional<std::string> Problem() const;
 
@@ -82,6 +101,7 @@ struct LensOptions {
     visit("refine_distortion", refine_distortion);
     visit("refine_focal", refine_focal);
     visit("refine_principal_point", refine_principal_point);
+    visit("refine_higher_terms", refine_higher_terms);
     visit("distortion_sigma", distortion_sigma);
     visit("focal_sigma", focal_sigma);
     visit("principal_sigma", principal_sigma);
@@ -124,7 +144,8 @@ struct BundleOptions {
   // directions.
   double blur_s_per_px = 0.002;
   // Closing is repeated, so many times at most, until classification changes next to nothing: then
-  // the result does not depend on where it started.
+  // the result does not depend on where it started. 0: cameras stay where the rounds before have
+  // left them, and all tracks are triangulated once more.
   int max_final_rounds = 5;
   // false holds the rotations in every round: they come out bit by bit as they went in.
   bool refine_rotations = true;
@@ -132,12 +153,17 @@ struct BundleOptions {
   // Whether the result says how well each pose, and a refined lens, is known; a seventh of the time
   // more on KITTI 00.
   bool find_covariance = false;
+  // Whether it says how well a refined lens is known; a hundredth.
+  bool find_lens_covariance = false;
 
   // A point needs two rays that meet at this angle, else its depth is noise. Low on purpose: a
   // shallow point holds rotations well: 1 deg instead of 0.2 costs KITTI 00 (first 200 frames) 4 %
   // of its position error, 0.05 deg gains nothing. At a focal length of 700 px, 0.2 deg is 2.4 px
   // of parallax. For clouds to look at see WithoutShallowPoints.
   double min_angle_deg = 0.2;
+
+  // A track with fewer fitting observations is dropped. Two serve where nothing has three.
+  int min_track_observations = kMinTrackObservations;
 
   // Up to this many frames the reduced system is factored densely (DENSE_SCHUR), above by CHOLMOD
   // (SPARSE_SCHUR).

@@ -21,6 +21,10 @@ struct BundleProblem {
   /// Frames whose pose does not move: the older side of a window. When empty, the first frame is
   /// held and the scale stays.
   std::set<FrameId> fixed_frames;
+  /// Standard deviations per axis, positive, of the start's orientations where those are
+  /// measurements themselves, of a gimbal or another system: where rotations move, they move
+  /// against these. Then no orientation is held for the gauge.
+  std::map<FrameId, double> rotation_sigma_rad;
 };
 
 }  // namespace rotslam

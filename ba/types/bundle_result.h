@@ -8,22 +8,13 @@
 #include <Eigen/Core>
 
 #include "rotodom/camera/camera.h"
+#include "rotodom/camera/lens_sigmas.h"
 #include "rotodom/types/reconstruction.h"
 
 namespace rotslam {
 
 /// Of (delta, centre): delta in rad as in Exp(delta) * cam_from_world, centre in world units.
 using PoseCovariance = Eigen::Matrix<double, 6, 6>;
-
-/// Standard deviations of a refined lens, the calibration's own counted in; zero for what was held.
-/// As pose_covariance, they count every observation's error as independent.
-struct LensSigmas {
-  double focal_px = 0.0;
-  double cx_px = 0.0;
-  double cy_px = 0.0;
-  double k1 = 0.0;  // of kFov, w
-  double k2 = 0.0;
-};
 
 /// How bundle adjustment ended.
 enum class BundleStatus {
@@ -89,7 +80,9 @@ struct BundleSummary {
   bool has_motion_blur = false;
   double lens_gain = 0.0;     // share of the cost that another lens took off, see LensOptions
   bool lens_refined = false;  // whether that was enough
-  std::optional<LensSigmas> lens_sigmas;  // where it was, with `options.find_covariance`
+  // Of a refined lens, where asked for: the calibration's own counted in. As pose_covariance, they
+  // count every observation's error as independent.
+  std::optional<LensSigmas> lens_sigmas;
   double seconds = 0.0;
   std::vector<BundleRoundSummary> rounds;
 };

@@ -125,17 +125,19 @@ BinaryWriter RowMajor(const Eigen::Matrix3d& matrix) {
   return writer;
 }
 
-// One track as two frames saw it.
+// Two keypoints of one scene point.
 struct Match {
   std::uint32_t keypoint_i = 0;
   std::uint32_t keypoint_j = 0;
   Eigen::Vector3d bearing_i;
   Eigen::Vector3d bearing_j;
-  bool is_refuted = false;  // by the track's point, which fits one of the two
+  bool is_refuted = false;   // by the track's point, which fits one of the two
+  bool is_verified = false;  // by the view-graph
 };
 using PairMatches = std::map<std::pair<FrameId, FrameId>, std::vector<Match>>;
 
-PairMatches ListMatches(const RunMap& map) {
+// Those that are in one track.
+PairMatches ListTrackMatches(const RunMap& map) {
   const std::vector<std::vector<int>> numbers = NumberKeypoints(map);
   PairMatches matches;
   for (std::size_t t = 0; t < numbers.size(); ++t) {
@@ -151,6 +153,71 @@ PairMatches ListMatches(const RunMap& map) {
              fits[a] != fits[b]});
       }
     }
+  }
+  return matches;
+}
+
+// The number of the keypoint at a pixel, by frame; of several the first.
+using NumberAtPixel = std::map<FrameId, std::map<std::pair<float, float>, std::uint32_t>>;
+
+NumberAtPixel ListPixels(const RunMap& map) {
+  NumberAtPixel number_at;
+  for (const auto& [frame, list] : ListKeypoints(map)) {
+    auto& of_frame = number_at[frame];
+    for (std::size_t k = 0; k < list.size(); ++k) {
+      const Eigen::Vector2f pixel = map.tracks[list[k].track]
+                                        .track.observations[list[k].observation]
+                                        .keypoint_px.cast<float>();
+      of_frame.try_emplace({pixel.x(), pixel.y()}, static_cast<std::uint32_t>(k));
+    }
+  }
+  return number_at;
+}
+
+// Adds the view-graph's matches of a pair; those that are in a track become verified.
+void AddVerified(const RunMap& map,
+                 const ViewGraphMatches& view_graph,
+                 const MatchedPair& pair,
+                 const NumberAtPixel& number_at,
+                 std::vector<Match>& matches) {
+  std::map<std::uint32_t, std::size_t> match_of_i;
+  std::set<std::uint32_t> taken_j;
+  for (std::size_t k = 0; k < matches.size(); ++k) {
+    match_of_i[matches[k].keypoint_i] = k;
+    taken_j.insert(matches[k].keypoint_j);
+  }
+  const auto find = [&](FrameId frame, int keypoint) {
+    const Eigen::Vector2f& pixel = view_graph.keypoints_px.at(frame)[keypoint];
+    const auto& of_frame = number_at.at(frame);
+    const auto number = of_frame.find({pixel.x(), pixel.y()});
+    const auto bearing = map.camera.Unproject(pixel.cast<double>());
+    return number == of_frame.end() || !bearing
+               ? std::nullopt
+               : std::optional(std::pair(number->second, *bearing));
+  };
+  for (const auto& [at_i, at_j] : pair.matches) {
+    const auto keypoint_i = find(pair.i, at_i);
+    const auto keypoint_j = find(pair.j, at_j);
+    if (!keypoint_i || !keypoint_j) continue;
+    const auto known = match_of_i.find(keypoint_i->first);
+    if (known != match_of_i.end()) {
+      // A keypoint that is matched otherwise stays as it is.
+      Match& match = matches[known->second];
+      match.is_verified = match.is_verified || match.keypoint_j == keypoint_j->first;
+    } else if (taken_j.insert(keypoint_j->first).second) {
+      matches.push_back(
+          {keypoint_i->first, keypoint_j->first, keypoint_i->second, keypoint_j->second});
+      matches.back().is_verified = true;
+    }
+  }
+}
+
+PairMatches ListMatches(const RunMap& map, const ViewGraphMatches& view_graph) {
+  PairMatches matches = ListTrackMatches(map);
+  const NumberAtPixel number_at = ListPixels(map);
+  for (const MatchedPair& pair : view_graph.pairs) {
+    if (!number_at.contains(pair.i) || !number_at.contains(pair.j)) continue;
+    AddVerified(map, view_graph, pair, number_at, matches[{pair.i, pair.j}]);
   }
   return matches;
 }
@@ -223,8 +290,41 @@ void InsertImages(const Database& database, const RunMap& map) {
   }
 }
 
+// The matches of a pair as COLMAP has them, and how many there are.
+struct MatchTable {
+  BinaryWriter numbers;
+  int rows = 0;
+
+  void Add(const Match& match) {
+    numbers.Put(match.keypoint_i);
+    numbers.Put(match.keypoint_j);
+    ++rows;
+  }
+};
+
+// Its columns behind `config`.
+void InsertGeometry(const PairPose& pose, const Camera& camera, Insertion& row) {
+  const bool is_undistorted = camera.model == CameraModel::kPinhole;
+  const Eigen::Matrix3d K = Intrinsics(camera);
+  const Eigen::Matrix3d K_inverse = K.inverse();
+  const Eigen::Matrix3d E = pose.Essential();
+  const Eigen::Matrix3d H = K * pose.j_from_i.Matrix() * K_inverse;
+  const bool has_f = is_undistorted && !pose.is_panoramic;
+  const bool has_h = is_undistorted && pose.is_panoramic;
+  has_f ? row.Blob(RowMajor(K_inverse.transpose() * E * K_inverse)) : row.Null();
+  pose.is_panoramic ? row.Null() : row.Blob(RowMajor(E));
+  has_h ? row.Blob(RowMajor(H)) : row.Null();
+  const Eigen::Quaterniond& q = pose.j_from_i.Quaternion();
+  BinaryWriter qvec;
+  for (const double value : {q.w(), q.x(), q.y(), q.z()}) qvec.Put(value);
+  BinaryWriter tvec;
+  for (const double value : pose.translation) tvec.Put(value);
+  row.Blob(qvec).Blob(tvec);
+}
+
 void InsertPairs(const Database& database,
                  const RunMap& map,
+                 const ViewGraphMatches& view_graph,
                  const ColmapDatabaseOptions& options) {
   std::map<FrameId, const MapFrame*> frames;
   for (const MapFrame& frame : map.frames) frames[frame.id] = &frame;
@@ -232,47 +332,30 @@ void InsertPairs(const Database& database,
   for (const MapEdge& edge : map.edges) {
     if (edge.rotation_only) rotation_only.insert(std::minmax(edge.i, edge.j));
   }
-  const Eigen::Matrix3d K_inverse = Intrinsics(map.camera).inverse();
-  const bool is_undistorted = map.camera.model == CameraModel::kPinhole;
   const double max_error = options.max_error_px / map.camera.MeanFocal();
 
   Insertion raw(database, "INSERT INTO matches VALUES (?, ?, 2, ?)");
   Insertion verified(database, "INSERT INTO two_view_geometries VALUES (?,?,2,?,?,?,?,?,?,?)");
-  for (const auto& [pair, matches] : ListMatches(map)) {
+  for (const auto& [pair, matches] : ListMatches(map, view_graph)) {
     if (static_cast<int>(matches.size()) < options.min_matches) continue;
     const PairPose pose =
         PoseOfPair(*frames.at(pair.first), *frames.at(pair.second), rotation_only.contains(pair));
-    BinaryWriter all;
-    BinaryWriter good;
-    int num_good = 0;
+    MatchTable all;
+    MatchTable good;
     for (const Match& match : matches) {
-      const bool is_good = !match.is_refuted && pose.Error(match) <= max_error;
-      num_good += is_good;
-      for (const std::uint32_t number : {match.keypoint_i, match.keypoint_j}) {
-        all.Put(number);
-        if (is_good) good.Put(number);
-      }
+      all.Add(match);
+      if (match.is_refuted) continue;
+      if (match.is_verified || pose.Error(match) <= max_error) good.Add(match);
     }
     const std::int64_t pair_id =
         kPairFactor * ColmapImageId(pair.first) + ColmapImageId(pair.second);
-    raw.Integer(pair_id).Integer(static_cast<std::int64_t>(matches.size())).Blob(all).Run();
-    if (num_good < options.min_matches) continue;
+    raw.Integer(pair_id).Integer(all.rows).Blob(all.numbers).Run();
+    if (good.rows < options.min_matches) continue;
 
-    verified.Integer(pair_id).Integer(num_good).Blob(good);
+    verified.Integer(pair_id).Integer(good.rows).Blob(good.numbers);
     verified.Integer(pose.is_panoramic ? kPanoramic : kCalibrated);
-    const Eigen::Matrix3d E = pose.Essential();
-    const Eigen::Matrix3d H = K_inverse.inverse() * pose.j_from_i.Matrix() * K_inverse;
-    const bool has_f = is_undistorted && !pose.is_panoramic;
-    const bool has_h = is_undistorted && pose.is_panoramic;
-    has_f ? verified.Blob(RowMajor(K_inverse.transpose() * E * K_inverse)) : verified.Null();
-    pose.is_panoramic ? verified.Null() : verified.Blob(RowMajor(E));
-    has_h ? verified.Blob(RowMajor(H)) : verified.Null();
-    const Eigen::Quaterniond& q = pose.j_from_i.Quaternion();
-    BinaryWriter qvec;
-    for (const double value : {q.w(), q.x(), q.y(), q.z()}) qvec.Put(value);
-    BinaryWriter tvec;
-    for (const double value : pose.translation) tvec.Put(value);
-    verified.Blob(qvec).Blob(tvec).Run();
+    InsertGeometry(pose, map.camera, verified);
+    verified.Run();
   }
 }
 
@@ -286,6 +369,7 @@ std::optional<std::string> ColmapDatabaseOptions::Problem() const {
 
 void WriteColmapDatabase(const fs::path& path,
                          const RunMap& map,
+                         const ViewGraphMatches& view_graph,
                          const ColmapDatabaseOptions& options) {
   if (const auto problem = options.Problem()) {
     throw std::invalid_argument("WriteColmapDatabase: " + *problem);
@@ -300,7 +384,7 @@ void WriteColmapDatabase(const fs::path& path,
       database.Execute(kTables);
       database.Execute("BEGIN");
       InsertImages(database, map);
-      InsertPairs(database, map, options);
+      InsertPairs(database, map, view_graph, options);
       database.Execute("COMMIT");
     } catch (const std::runtime_error& failure) {
       throw std::runtime_error(path.string() + ": cannot write the file: " + failure.what());

@@ -5,6 +5,7 @@
 #include <string>
 
 #include "output/map/run_map.h"
+#include "output/map/view_graph_matches.h"
 
 namespace rotslam {
 
@@ -30,18 +31,22 @@ struct ColmapDatabaseOptions {
 /// Writes a COLMAP database (SQLite, its version 3.8; later ones take it over when they open it):
 /// one camera, the frames as images with the ids of WriteColmapModel, their sightings as keypoints
 /// in its order, and per pair of frames
-/// - `matches`: all tracks that both show;
-/// - `two_view_geometries`: those of them that agree with the poses, unless the track's point fits
-///   one of the two sightings only, and E (of unit translation), F where the camera has no
-///   distortion, and the pose of the second camera from the first. Pairs at one place, and those
-///   that the view-graph saw no baseline in, have configuration 5 (PANORAMIC) and the homography of
-///   the turn at infinity; the others 2 (CALIBRATED).
+/// - `matches`: all tracks that both show, and what the view-graph has verified between them;
+/// - `two_view_geometries`: what the view-graph has verified, and the tracks that agree with the
+///   poses, unless the track's point fits one of the two sightings only; E (of unit translation), F
+///   where the camera has no distortion, and the pose of the second camera from the first. Pairs at
+///   one place, and those that the view-graph saw no baseline in, have configuration 5 (PANORAMIC)
+///   and the homography of the rotation at infinity; the others 2 (CALIBRATED).
+/// @param map         keypoints of matches that none of its tracks has are left out with their
+///                    matches: see AddKeypoints.
+/// @param view_graph  may be empty.
 /// There are no descriptors: matching is done.
 /// Throws std::invalid_argument when options.Problem(), std::runtime_error when SQLite or the disk
 /// refuse; never leaves half a file.
 /// Cost:    quadratic in the length of tracks.
 void WriteColmapDatabase(const std::filesystem::path& path,
                          const RunMap& map,
+                         const ViewGraphMatches& view_graph,
                          const ColmapDatabaseOptions& options = {});
 
 }  // namespace rotslam

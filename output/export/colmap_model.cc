@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <array>
+#include <charconv>
 #include <cmath>
 #include <cstdint>
 #include <iterator>
@@ -16,16 +17,13 @@
 #include "output/files/binary_file.h"
 #include "output/trajectory/unit_length.h"
 #include "rotodom/camera/colmap_camera.h"
+#include "rotodom/types/median.h"
 #include "rotodom/types/text_file.h"
 
 namespace rotslam {
 namespace {
 
 namespace fs = std::filesystem;
-
-struct Image {
-  std::vector<Eigen::Vector2d> keypoints_px;  // COLMAP's pixel centres
-};
 
 struct PointTrack {
   std::uint64_t id = 0;
@@ -52,7 +50,7 @@ class ModelBuilder {
                 std::uint64_t id,
                 const std::array<double, 7>& qvec_tvec,
                 std::string name,
-                Image image) {
+                ColmapImage image) {
     const FrameId frame{SmallId(file, "image", id)};
     const std::string who = "image " + std::to_string(id);
     const Eigen::Quaterniond q(qvec_tvec[0], qvec_tvec[1], qvec_tvec[2], qvec_tvec[3]);
@@ -69,8 +67,27 @@ class ModelBuilder {
       Fail(file, who + " is there twice");
     }
     model_.reconstruction.center_in_world[frame] = -(cam_from_world.Inverse() * t);
+    if (!model_.cameras.contains(image.camera)) {
+      Fail(file, who + " names camera " + std::to_string(image.camera) + ", which there is not");
+    }
     model_.image_name[frame] = std::move(name);
-    images_[id] = std::move(image);
+    model_.images[frame] = std::move(image);
+  }
+
+  // To be called between images and points.
+  void ChooseCamera() {
+    if (!model_.HasSeveralCameras()) {
+      const bool has_images = !model_.images.empty();
+      model_.camera = has_images ? model_.cameras.at(model_.images.begin()->second.camera)
+                                 : model_.cameras.begin()->second;
+      return;
+    }
+    std::vector<double> focals_px;
+    for (const auto& [frame, image] : model_.images) {
+      focals_px.push_back(model_.cameras.at(image.camera).MeanFocal());
+    }
+    model_.camera.fx = model_.camera.fy = Median(std::move(focals_px));
+    is_common_ = true;
   }
 
   void AddPoint(const fs::path& file, const PointTrack& point) {
@@ -79,9 +96,11 @@ class ModelBuilder {
     if (!points_.insert(point.id).second) Fail(file, who + " is there twice");
     Track track;
     track.rgb = point.rgb;
+    std::map<FrameId, int> keypoint_of;
     for (const auto& [image_id, index] : point.sights) {
-      const auto image = images_.find(image_id);
-      if (image == images_.end()) {
+      const FrameId frame{SmallId(file, "image", image_id)};
+      const auto image = model_.images.find(frame);
+      if (image == model_.images.end()) {
         Fail(file, who + " names image " + std::to_string(image_id) + ", which there is not");
       }
       if (index >= image->second.keypoints_px.size()) {
@@ -90,43 +109,52 @@ class ModelBuilder {
                  std::to_string(image_id) + ", which has " +
                  std::to_string(image->second.keypoints_px.size()));
       }
-      const Eigen::Vector2d keypoint_px =
-          image->second.keypoints_px[index] - Eigen::Vector2d(0.5, 0.5);
-      const auto bearing = model_.camera.Unproject(keypoint_px);
+      const Camera& camera = model_.cameras.at(image->second.camera);
+      Eigen::Vector2d keypoint_px = image->second.keypoints_px[index] - Eigen::Vector2d(0.5, 0.5);
+      const auto bearing = camera.Unproject(keypoint_px);
       if (!bearing) continue;
-      track.observations.push_back(
-          {FrameId{static_cast<int>(image_id)}, keypoint_px, *bearing, 1.0});
+      double sigma_px = 1.0;
+      if (is_common_) {
+        const auto moved_px = model_.camera.Project(*bearing);
+        if (!moved_px) continue;
+        keypoint_px = *moved_px;
+        sigma_px = model_.camera.fx / camera.MeanFocal();
+      }
+      if (!keypoint_of.try_emplace(frame, static_cast<int>(index)).second) {
+        ++model_.num_doubled;
+        continue;
+      }
+      track.observations.push_back({frame, keypoint_px, *bearing, sigma_px});
     }
-    auto& observations = track.observations;
-    std::stable_sort(observations.begin(),
-                     observations.end(),
-                     [](const Observation& a, const Observation& b) { return a.frame < b.frame; });
-    observations.erase(
-        std::unique(observations.begin(),
-                    observations.end(),
-                    [](const Observation& a, const Observation& b) { return a.frame == b.frame; }),
-        observations.end());
+    std::sort(track.observations.begin(),
+              track.observations.end(),
+              [](const Observation& a, const Observation& b) { return a.frame < b.frame; });
     track.id = TrackId{static_cast<int>(model_.reconstruction.tracks.size())};
+    model_.point_id[track.id] = point.id;
+    std::vector<int>& keypoints = model_.keypoints[track.id];
+    for (const auto& [frame, keypoint] : keypoint_of) keypoints.push_back(keypoint);
     model_.reconstruction.point_in_world[track.id] = point.point_in_world;
     model_.reconstruction.tracks.push_back(std::move(track));
   }
 
   void AddCamera(const fs::path& file, const std::vector<std::string>& words) {
     const Camera camera = ReadColmapCamera(file, words);
-    if (has_camera_ && camera != model_.camera) {
-      Fail(file, "camera " + words.front() + " differs from those before; only one is supported");
+    std::int64_t id = 0;
+    const std::string& word = words.front();
+    const auto [stop, code] = std::from_chars(word.data(), word.data() + word.size(), id);
+    if (code != std::errc() || stop != word.data() + word.size()) {
+      Fail(file, "expected a camera's id, found \"" + word + "\"");
     }
-    model_.camera = camera;
-    has_camera_ = true;
+    if (!model_.cameras.emplace(id, camera).second)
+      Fail(file, "camera " + word + " is there twice");
   }
 
-  bool has_camera() const { return has_camera_; }
+  bool has_camera() const { return !model_.cameras.empty(); }
   ColmapModel Take() { return std::move(model_); }
 
  private:
   ColmapModel model_;
-  bool has_camera_ = false;
-  std::map<std::uint64_t, Image> images_;
+  bool is_common_ = false;  // keypoints are moved to a camera of all
   std::set<std::uint64_t> points_;
 };
 
@@ -157,9 +185,9 @@ void ReadBinaryImages(const fs::path& file, ModelBuilder& builder) {
     const auto id = bytes.Get<std::uint32_t>();
     std::array<double, 7> pose;
     for (double& value : pose) value = bytes.Get<double>();
-    bytes.Get<std::uint32_t>();  // its camera: all are equal
+    ColmapImage image;
+    image.camera = bytes.Get<std::uint32_t>();
     std::string name = bytes.Name();
-    Image image;
     const auto count = bytes.Count("keypoints", 24);
     image.keypoints_px.reserve(count);
     for (std::uint64_t k = 0; k < count; ++k) {
@@ -223,8 +251,8 @@ void ReadTextImages(const fs::path& file, ModelBuilder& builder) {
     const std::uint64_t id = IdAt(file, row, 0);
     std::array<double, 7> pose;
     for (std::size_t p = 0; p < pose.size(); ++p) pose[p] = NumberAt(file, row, 1 + p);
-    IdAt(file, row, 8);
-    Image image;
+    ColmapImage image;
+    image.camera = static_cast<std::int64_t>(IdAt(file, row, 8));
     if (k + 1 < rows.size()) {
       const TextRow& keypoints = rows[k + 1];
       if (keypoints.words.size() % 3 != 0) {
@@ -275,6 +303,12 @@ void ReadTextCameras(const fs::path& file, ModelBuilder& builder) {
 
 }  // namespace
 
+bool ColmapModel::HasSeveralCameras() const {
+  return std::any_of(images.begin(), images.end(), [&](const auto& entry) {
+    return cameras.at(entry.second.camera) != cameras.at(images.begin()->second.camera);
+  });
+}
+
 ColmapModel ReadColmapModel(const fs::path& folder) {
   ModelBuilder builder;
   const bool is_binary = fs::exists(folder / "images.bin");
@@ -284,6 +318,7 @@ ColmapModel ReadColmapModel(const fs::path& folder) {
   if (!builder.has_camera()) Fail(cameras, "has no camera");
   const fs::path images = folder / ("images" + ending);
   is_binary ? ReadBinaryImages(images, builder) : ReadTextImages(images, builder);
+  builder.ChooseCamera();
   const fs::path points = folder / ("points3D" + ending);
   is_binary ? ReadBinaryPoints(points, builder) : ReadTextPoints(points, builder);
   return builder.Take();

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <cstdint>
 #include <filesystem>
 #include <map>
 #include <string>
@@ -11,15 +12,31 @@
 
 namespace rotslam {
 
+/// An image of a COLMAP model, as the file has it.
+struct ColmapImage {
+  std::int64_t camera = 0;                    // its id
+  std::vector<Eigen::Vector2d> keypoints_px;  // COLMAP's pixel centres
+};
+
 /// A COLMAP model as ours: image ids are frames, point ids tracks numbered anew in their order.
 struct ColmapModel {
+  // The camera of all images. Where they have several, a pinhole of the median focal length with
+  // the principal point at zero: the tracks' keypoints are moved to it, through their own lenses.
   Camera camera;
   Reconstruction reconstruction;
   std::map<FrameId, std::string> image_name;
+  // What it takes to write the model again.
+  std::map<std::int64_t, Camera> cameras;  // by id
+  std::map<FrameId, ColmapImage> images;
+  std::map<TrackId, std::uint64_t> point_id;
+  std::map<TrackId, std::vector<int>> keypoints;  // of each observation, its place in its image
+  int num_doubled = 0;  // observations left out: the second one of a point in an image
+
+  bool HasSeveralCameras() const;
 };
 
 /// Reads `cameras`, `images` and `points3D` of a folder, as .bin or, where there is no images.bin,
-/// as .txt. Cameras of several ids must be equal. Keypoints lose 0.5: COLMAP's pixel centres lie at
+/// as .txt. Keypoints lose 0.5: COLMAP's pixel centres lie at
 /// one half. A second observation of one point in one image is left out, and so are those whose
 /// bearing the lens does not have. World and camera axes are COLMAP's own, which are ours.
 /// Throws std::runtime_error in one line with file and reason: missing, cut short, counts beyond
@@ -51,5 +68,28 @@ enum class ColmapForm { kBinary, kText };
 /// same. Text has 17 digits, so both read back the same.
 /// Throws std::runtime_error when a file cannot be written.
 void WriteColmapModel(const std::filesystem::path& folder, const RunMap& map, ColmapForm form);
+
+/// What COLMAP's model_analyzer says of a model.
+struct ColmapFigures {
+  int num_images = 0;
+  int num_points = 0;
+  int num_observations = 0;
+  double mean_error_px = 0.0;  // over the observations that their cameras can see
+  int num_seen = 0;            // of these
+};
+
+/// Of poses and points in the frames and tracks of `model`, by the images' own cameras.
+ColmapFigures FiguresOf(const ColmapModel& model, const Reconstruction& map);
+
+/// Writes a model that has been solved anew: ids, names, keypoints and cameras are those of
+/// `model`, poses, points and what they are seen by those of `solved`. Images without a pose are
+/// left out.
+/// @param model   its `cameras` are written, with refined numbers where they have been refined.
+/// @param solved  with the frames and tracks of `model`.
+/// Throws std::runtime_error when a file cannot be written.
+void WriteColmapModel(const std::filesystem::path& folder,
+                      const ColmapModel& model,
+                      const Reconstruction& solved,
+                      ColmapForm form);
 
 }  // namespace rotslam

@@ -2,6 +2,7 @@
 #include <cstdint>
 #include <limits>
 #include <map>
+#include <optional>
 #include <stdexcept>
 #include <system_error>
 #include <vector>
@@ -184,6 +185,237 @@ void WriteColmapModel(const fs::path& folder, const RunMap& map, ColmapForm form
   ReplaceFile(folder / "cameras.bin", BinaryCameras(map));
   ReplaceFile(folder / "images.bin", BinaryImages(map, keypoints));
   ReplaceFile(folder / "points3D.bin", BinaryPoints(map, numbers));
+}
+
+namespace {
+
+// A solved model in the ids of the file that it comes from.
+struct SolvedModel {
+  const ColmapModel& model;
+  const Reconstruction& solved;
+  // By image and place of the keypoint, the id of the point that it shows.
+  std::map<FrameId, std::map<int, std::uint64_t>> point_of;
+};
+
+// Calls `take(observation, keypoint)` for those of a solved track.
+template <class Take>
+void ForEachSight(const ColmapModel& model, const Track& track, Take&& take) {
+  const Track& given = model.reconstruction.tracks.at(track.id.value);
+  const std::vector<int>& keypoints = model.keypoints.at(track.id);
+  std::size_t k = 0;
+  for (const Observation& observation : track.observations) {
+    while (given.observations[k].frame != observation.frame) ++k;
+    take(observation, keypoints[k]);
+  }
+}
+
+SolvedModel MakeSolved(const ColmapModel& model, const Reconstruction& solved) {
+  SolvedModel made{model, solved, {}};
+  for (const Track& track : solved.tracks) {
+    if (!solved.point_in_world.contains(track.id)) continue;
+    ForEachSight(model, track, [&](const Observation& observation, int keypoint) {
+      made.point_of[observation.frame][keypoint] = model.point_id.at(track.id);
+    });
+  }
+  return made;
+}
+
+// How far a keypoint is from where its camera sees the point, px.
+std::optional<double> SightErrorPx(const ColmapModel& model,
+                                   const Reconstruction& map,
+                                   const Eigen::Vector3d& point,
+                                   FrameId frame,
+                                   int keypoint) {
+  const ColmapImage& image = model.images.at(frame);
+  const Eigen::Vector3d in_cam =
+      map.cam_from_world.at(frame) * (point - map.center_in_world.at(frame));
+  const auto seen = model.cameras.at(image.camera).Project(in_cam);
+  if (!seen) return std::nullopt;
+  return (*seen + Eigen::Vector2d::Constant(kPixelCentre) -
+          image.keypoints_px[static_cast<std::size_t>(keypoint)])
+      .norm();
+}
+
+// The mean over a track.
+double SolvedErrorPx(const SolvedModel& made, const Track& track) {
+  const Eigen::Vector3d& point = made.solved.point_in_world.at(track.id);
+  double sum_px = 0.0;
+  int count = 0;
+  ForEachSight(made.model, track, [&](const Observation& observation, int keypoint) {
+    const auto error_px = SightErrorPx(made.model, made.solved, point, observation.frame, keypoint);
+    if (!error_px) return;
+    sum_px += *error_px;
+    ++count;
+  });
+  return count == 0 ? 0.0 : sum_px / count;
+}
+
+// One form of the three files: numbers and names one after the other, lines where there are such.
+class ModelText {
+ public:
+  explicit ModelText(ColmapForm form) : is_text_(form == ColmapForm::kText) {}
+
+  void Count(std::uint64_t count) {
+    if (!is_text_) writer_.Put(count);
+  }
+  template <class Binary>
+  void Whole(std::uint64_t value) {
+    if (is_text_) {
+      Word(std::to_string(value));
+    } else {
+      writer_.Put(static_cast<Binary>(value));
+    }
+  }
+  void Number(double value) {
+    if (is_text_) {
+      Word(FormatNumber("%.17g", value));
+    } else {
+      writer_.Put(value);
+    }
+  }
+  void Name(const std::string& name) {
+    if (is_text_) {
+      Word(name);
+    } else {
+      writer_.PutName(name);
+    }
+  }
+  // The word that stands in text for what has a number in binary.
+  void Model(const ColmapCamera& camera) {
+    if (is_text_) {
+      Word(camera.model);
+    } else {
+      writer_.Put(static_cast<std::int32_t>(camera.model_id));
+    }
+  }
+  void NoPoint() {
+    if (is_text_) {
+      Word("-1");
+    } else {
+      writer_.Put(std::numeric_limits<std::uint64_t>::max());
+    }
+  }
+  void EndLine() {
+    if (is_text_) text_ += '\n';
+    at_start_ = true;
+  }
+  const std::string& content() const { return is_text_ ? text_ : writer_.bytes(); }
+
+ private:
+  void Word(const std::string& word) {
+    if (!at_start_) text_ += ' ';
+    text_ += word;
+    at_start_ = false;
+  }
+
+  bool is_text_;
+  bool at_start_ = true;
+  std::string text_;
+  BinaryWriter writer_;
+};
+
+std::string SolvedCameras(const ColmapModel& model, ColmapForm form) {
+  ModelText text(form);
+  text.Count(model.cameras.size());
+  for (const auto& [id, camera] : model.cameras) {
+    const ColmapCamera colmap = ToColmap(camera);
+    text.Whole<std::uint32_t>(static_cast<std::uint64_t>(id));
+    text.Model(colmap);
+    text.Whole<std::uint64_t>(static_cast<std::uint64_t>(camera.width));
+    text.Whole<std::uint64_t>(static_cast<std::uint64_t>(camera.height));
+    for (const double value : colmap.parameters) text.Number(value);
+    text.EndLine();
+  }
+  return text.content();
+}
+
+std::string SolvedImages(const SolvedModel& made, ColmapForm form) {
+  ModelText text(form);
+  text.Count(made.solved.center_in_world.size());
+  for (const auto& [frame, center] : made.solved.center_in_world) {
+    const ColmapImage& image = made.model.images.at(frame);
+    text.Whole<std::uint32_t>(static_cast<std::uint64_t>(frame.value));
+    MapFrame pose;
+    pose.cam_from_world = made.solved.cam_from_world.at(frame);
+    pose.center_in_world = center;
+    for (const double value : PoseNumbers(pose)) text.Number(value);
+    text.Whole<std::uint32_t>(static_cast<std::uint64_t>(image.camera));
+    text.Name(made.model.image_name.at(frame));
+    text.EndLine();
+    text.Count(image.keypoints_px.size());
+    const auto points = made.point_of.find(frame);
+    for (std::size_t k = 0; k < image.keypoints_px.size(); ++k) {
+      text.Number(image.keypoints_px[k].x());
+      text.Number(image.keypoints_px[k].y());
+      if (points == made.point_of.end() || !points->second.contains(static_cast<int>(k))) {
+        text.NoPoint();
+      } else {
+        text.Whole<std::uint64_t>(points->second.at(static_cast<int>(k)));
+      }
+    }
+    text.EndLine();
+  }
+  return text.content();
+}
+
+std::string SolvedPoints(const SolvedModel& made, ColmapForm form) {
+  ModelText text(form);
+  text.Count(made.solved.point_in_world.size());
+  for (const Track& track : made.solved.tracks) {
+    const auto point = made.solved.point_in_world.find(track.id);
+    if (point == made.solved.point_in_world.end()) continue;
+    text.Whole<std::uint64_t>(made.model.point_id.at(track.id));
+    for (const double value : point->second) text.Number(value);
+    for (const std::uint8_t value : track.rgb) text.Whole<std::uint8_t>(value);
+    text.Number(SolvedErrorPx(made, track));
+    text.Count(track.observations.size());
+    ForEachSight(made.model, track, [&](const Observation& observation, int keypoint) {
+      text.Whole<std::uint32_t>(static_cast<std::uint64_t>(observation.frame.value));
+      text.Whole<std::uint32_t>(static_cast<std::uint64_t>(keypoint));
+    });
+    text.EndLine();
+  }
+  return text.content();
+}
+
+}  // namespace
+
+ColmapFigures FiguresOf(const ColmapModel& model, const Reconstruction& map) {
+  ColmapFigures figures;
+  figures.num_images = static_cast<int>(map.center_in_world.size());
+  double sum_px = 0.0;
+  for (const Track& track : map.tracks) {
+    const auto point = map.point_in_world.find(track.id);
+    if (point == map.point_in_world.end()) continue;
+    ++figures.num_points;
+    figures.num_observations += static_cast<int>(track.observations.size());
+    ForEachSight(model, track, [&](const Observation& observation, int keypoint) {
+      const auto error_px = SightErrorPx(model, map, point->second, observation.frame, keypoint);
+      if (!error_px) return;
+      sum_px += *error_px;
+      ++figures.num_seen;
+    });
+  }
+  if (figures.num_seen > 0) figures.mean_error_px = sum_px / figures.num_seen;
+  return figures;
+}
+
+void WriteColmapModel(const fs::path& folder,
+                      const ColmapModel& model,
+                      const Reconstruction& solved,
+                      ColmapForm form) {
+  std::error_code error;
+  fs::create_directories(folder, error);
+  if (error) throw std::runtime_error(folder.string() + ": cannot be made: " + error.message());
+  const SolvedModel made = MakeSolved(model, solved);
+  const bool is_text = form == ColmapForm::kText;
+  const std::string ending = is_text ? ".txt" : ".bin";
+  for (const char* name : {"cameras", "images", "points3D"}) {
+    fs::remove(folder / (std::string(name) + (is_text ? ".bin" : ".txt")), error);
+  }
+  ReplaceFile(folder / ("cameras" + ending), SolvedCameras(model, form));
+  ReplaceFile(folder / ("images" + ending), SolvedImages(made, form));
+  ReplaceFile(folder / ("points3D" + ending), SolvedPoints(made, form));
 }
 
 }  // namespace rotslam

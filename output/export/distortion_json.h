@@ -21,9 +21,8 @@ inline void RefuseLensBeyondRadtan(const std::filesystem::path& file,
   throw std::runtime_error(file.string() + ": is not written: " + system +
                            " has no camera model for " +
                            (is_rational ? "a rational lens (k4 k5 k6)" : "a FOV lens (w)") +
-                           "; COLMAP has: export --to colmap, let `colmap image_undistorter` take "
-                           "the distortion out, and "
-                           "run rotslam on the images and cameras that it writes");
+                           "; --undistort writes images without distortion, and COLMAP has a model "
+                           "of it: export --to colmap");
 }
 
 /// Adds k1 to k4 of a fisheye lens, or k1, k2, p1, p2, k3 of any other, as OpenCV orders them.

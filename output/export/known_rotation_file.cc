@@ -1,8 +1,10 @@
 #include "output/export/known_rotation_file.h"
 
 #include <algorithm>
+#include <charconv>
 #include <cmath>
 #include <cstdint>
+#include <limits>
 #include <numbers>
 #include <set>
 #include <stdexcept>
@@ -49,6 +51,18 @@ class RowReader {
            FormatNumber("%.0f", low) + " on");
     }
     return static_cast<int>(value);
+  }
+  // A whole number from 0 on, up to 2^64 - 1.
+  std::uint64_t Id(const char* name) {
+    const std::string& word = Word();
+    std::uint64_t value = 0;
+    const char* const end = word.data() + word.size();
+    const char* const begin = word.data() + (word.starts_with('+') ? 1 : 0);
+    const auto [stop, code] = std::from_chars(begin, end, value);
+    if (code != std::errc() || stop != end) {
+      Fail(std::string(name) + " is " + word + ", must be a whole number from 0 on");
+    }
+    return value;
   }
   // A count of rows to come.
   std::size_t Count(const char* name, std::size_t rows_each) {
@@ -101,27 +115,69 @@ Camera ReadCameraRow(RowReader& reader) {
   return camera;
 }
 
-void ReadViewRow(RowReader& reader, KnownRotationInput& input) {
+// Numbers for the ids of a file: themselves where all are below 2^31 - 1, else from 0 on.
+template <class OurId>
+std::map<std::uint64_t, OurId> NumberIds(const std::set<std::uint64_t>& ids,
+                                         std::map<OurId, std::string>& name) {
+  std::map<std::uint64_t, OurId> numbers;
+  const bool fit = ids.empty() || *ids.rbegin() < static_cast<std::uint64_t>(
+                                                      std::numeric_limits<std::int32_t>::max());
+  for (const std::uint64_t id : ids) {
+    const OurId number{fit ? static_cast<int>(id) : static_cast<int>(numbers.size())};
+    numbers[id] = number;
+    if (!fit) name[number] = std::to_string(id);
+  }
+  return numbers;
+}
+
+struct ViewRow {
+  std::uint64_t id = 0;
+  double timestamp_s = 0.0;
+  Rotation world_from_cam;
+  double sigma_deg = 0.0;
+};
+
+ViewRow ReadViewRow(RowReader& reader) {
   reader.Next();
-  const FrameId view{reader.Integer("view", 0.0)};
-  const double timestamp_s = reader.Number();
+  ViewRow row;
+  row.id = reader.Id("view");
+  row.timestamp_s = reader.Number();
   Eigen::Vector4d q;
   for (int k = 0; k < 4; ++k) q[k] = reader.Number();
   if (!IsUnitLength(q.norm())) reader.Fail("the quaternion is not of length 1");
-  const double sigma_deg = reader.Number();
-  if (sigma_deg < 0.0) reader.Fail("sigma is negative");
-  const Rotation world_from_cam(Eigen::Quaterniond(q[3], q[0], q[1], q[2]));
-  if (!input.cam_from_world.emplace(view, world_from_cam.Inverse()).second) {
-    reader.Fail("view " + std::to_string(view.value) + " is there twice");
-  }
-  input.timestamp_s[view] = timestamp_s;
-  if (sigma_deg > 0.0) input.sigma_rad[view] = sigma_deg * kRadFromDeg;
+  row.sigma_deg = reader.Number();
+  if (row.sigma_deg < 0.0) reader.Fail("sigma is negative");
+  row.world_from_cam = Rotation(Eigen::Quaterniond(q[3], q[0], q[1], q[2]));
+  return row;
 }
 
-void ReadTrackRow(RowReader& reader, KnownRotationInput& input) {
+// @return  the numbers of the views, by id.
+std::map<std::uint64_t, FrameId> ReadViewRows(RowReader& reader, KnownRotationInput& input) {
+  std::vector<ViewRow> rows;
+  std::set<std::uint64_t> ids;
+  for (std::size_t left = reader.Count("views", 1); left > 0; --left) {
+    rows.push_back(ReadViewRow(reader));
+    if (!ids.insert(rows.back().id).second) {
+      reader.Fail("view " + std::to_string(rows.back().id) + " is there twice");
+    }
+  }
+  std::map<std::uint64_t, FrameId> numbers = NumberIds(ids, input.view_name);
+  for (const ViewRow& row : rows) {
+    const FrameId view = numbers.at(row.id);
+    input.cam_from_world[view] = row.world_from_cam.Inverse();
+    input.timestamp_s[view] = row.timestamp_s;
+    if (row.sigma_deg > 0.0) input.sigma_rad[view] = row.sigma_deg * kRadFromDeg;
+  }
+  return numbers;
+}
+
+// @return  the track's id; that of the track itself is not set.
+std::uint64_t ReadTrackRow(RowReader& reader,
+                           const std::map<std::uint64_t, FrameId>& views,
+                           KnownRotationInput& input) {
   reader.Next();
   Track track;
-  track.id = TrackId{reader.Integer("track", 0.0)};
+  const std::uint64_t id = reader.Id("track");
   for (std::uint8_t& value : track.rgb) {
     const int grey = reader.Integer("colour", 0.0);
     if (grey > 255) reader.Fail("a colour is above 255");
@@ -134,36 +190,92 @@ void ReadTrackRow(RowReader& reader, KnownRotationInput& input) {
   }
   for (int k = 0; k < count; ++k) {
     Observation observation;
-    observation.frame = FrameId{reader.Integer("view", 0.0)};
+    const std::uint64_t view = reader.Id("view");
     observation.keypoint_px.x() = reader.Number();
     observation.keypoint_px.y() = reader.Number();
     observation.sigma_px = reader.Number();
     if (!(observation.sigma_px > 0.0)) reader.Fail("sigma_px must be positive");
-    if (!input.cam_from_world.contains(observation.frame)) {
-      reader.Fail("view " + std::to_string(observation.frame.value) + " is not among the views");
+    const auto number = views.find(view);
+    if (number == views.end()) {
+      reader.Fail("view " + std::to_string(view) + " is not among the views");
     }
+    observation.frame = number->second;
     const auto bearing = input.camera.Unproject(observation.keypoint_px);
     if (!bearing) continue;
     observation.bearing = *bearing;
     track.observations.push_back(observation);
   }
   input.tracks.push_back(std::move(track));
+  return id;
 }
 
-void RefuseDoubles(const fs::path& path, const std::vector<Track>& tracks) {
-  std::set<TrackId> ids;
-  for (const Track& track : tracks) {
-    const std::string name = "track " + std::to_string(track.id.value);
-    if (!ids.insert(track.id).second) {
-      throw std::runtime_error(path.string() + ": " + name + " is there twice");
-    }
-    std::set<FrameId> frames;
-    for (const Observation& observation : track.observations) {
-      if (frames.insert(observation.frame).second) continue;
-      throw std::runtime_error(path.string() + ": " + name + " has two observations in view " +
-                               std::to_string(observation.frame.value));
+void ReadTrackRows(RowReader& reader,
+                   const std::map<std::uint64_t, FrameId>& views,
+                   KnownRotationInput& input) {
+  const std::size_t num_tracks = reader.Count("tracks", 1);
+  input.tracks.reserve(num_tracks);
+  std::vector<std::uint64_t> ids;
+  std::set<std::uint64_t> different;
+  for (std::size_t left = num_tracks; left > 0; --left) {
+    ids.push_back(ReadTrackRow(reader, views, input));
+    if (!different.insert(ids.back()).second) {
+      reader.Fail("track " + std::to_string(ids.back()) + " is there twice");
     }
   }
+  const std::map<std::uint64_t, TrackId> numbers = NumberIds(different, input.track_name);
+  for (std::size_t k = 0; k < ids.size(); ++k) input.tracks[k].id = numbers.at(ids[k]);
+}
+
+// Makes one of two observations of a track in a view.
+void MergeDoubles(KnownRotationInput& input) {
+  constexpr double kSamePlacePx = 1.0;
+  int num_merged = 0;
+  int num_apart = 0;
+  std::string first;
+  for (Track& track : input.tracks) {
+    std::map<FrameId, std::vector<std::size_t>> by_view;
+    for (std::size_t k = 0; k < track.observations.size(); ++k) {
+      by_view[track.observations[k].frame].push_back(k);
+    }
+    if (by_view.size() == track.observations.size()) continue;
+    std::vector<Observation> merged;
+    for (std::size_t k = 0; k < track.observations.size(); ++k) {
+      const std::vector<std::size_t>& same = by_view.at(track.observations[k].frame);
+      if (same.front() != k) continue;
+      Observation one = track.observations[k];
+      if (same.size() == 1) {
+        merged.push_back(one);
+        continue;
+      }
+      if (first.empty()) first = NameOf(input, track.id) + " in view " + NameOf(input, one.frame);
+      Eigen::Vector2d mean_px = Eigen::Vector2d::Zero();
+      double spread_px = 0.0;
+      for (const std::size_t other : same) {
+        const Observation& observation = track.observations[other];
+        mean_px += observation.keypoint_px / static_cast<double>(same.size());
+        spread_px = std::max(spread_px, (observation.keypoint_px - one.keypoint_px).norm());
+        one.sigma_px = std::min(one.sigma_px, observation.sigma_px);
+      }
+      const auto bearing = input.camera.Unproject(mean_px);
+      if (spread_px > kSamePlacePx || !bearing) {
+        ++num_apart;
+        continue;
+      }
+      ++num_merged;
+      one.keypoint_px = mean_px;
+      one.bearing = *bearing;
+      merged.push_back(one);
+    }
+    track.observations = std::move(merged);
+  }
+  if (num_merged + num_apart == 0) return;
+  std::string note = std::to_string(num_merged + num_apart) +
+                     " times a track has several observations in a view, first track " + first +
+                     ": " + std::to_string(num_merged) + " merged";
+  if (num_apart > 0) {
+    note += ", " + std::to_string(num_apart) + " left out, since they are apart";
+  }
+  input.notes.push_back(std::move(note));
 }
 
 KnownRotationInput ReadOurs(const fs::path& path) {
@@ -176,17 +288,15 @@ KnownRotationInput ReadOurs(const fs::path& path) {
   input.camera = ReadCameraRow(reader);
   reader.Next();
   reader.Expect("views");
-  for (std::size_t left = reader.Count("views", 1); left > 0; --left) ReadViewRow(reader, input);
+  const std::map<std::uint64_t, FrameId> views = ReadViewRows(reader, input);
   reader.Next();
   reader.Expect("tracks");
-  const std::size_t num_tracks = reader.Count("tracks", 1);
-  input.tracks.reserve(num_tracks);
-  for (std::size_t left = num_tracks; left > 0; --left) ReadTrackRow(reader, input);
+  ReadTrackRows(reader, views, input);
   if (reader.RowsLeft() > 0) {
     reader.Next();
     reader.Fail("there are more lines than the file says it has tracks");
   }
-  RefuseDoubles(path, input.tracks);
+  MergeDoubles(input);
   return input;
 }
 
@@ -262,7 +372,29 @@ KnownRotationInput ReadBal(const fs::path& path) {
               [](const Observation& a, const Observation& b) { return a.frame < b.frame; });
     input.tracks.push_back(std::move(track));
   }
-  RefuseDoubles(path, input.tracks);
+  MergeDoubles(input);
+  return input;
+}
+
+KnownRotationInput FromColmap(std::shared_ptr<const ColmapModel> model) {
+  KnownRotationInput input;
+  input.format = "COLMAP";
+  input.camera = model->camera;
+  input.cam_from_world = model->reconstruction.cam_from_world;
+  input.tracks = model->reconstruction.tracks;
+  for (const auto& [track, id] : model->point_id) {
+    if (id != static_cast<std::uint64_t>(track.value)) input.track_name[track] = std::to_string(id);
+  }
+  if (model->num_doubled > 0) {
+    input.notes.push_back("points have a second keypoint in an image " +
+                          std::to_string(model->num_doubled) + " times: the first one is kept");
+  }
+  if (model->HasSeveralCameras()) {
+    input.notes.push_back("the images have " + std::to_string(model->cameras.size()) +
+                          " cameras: they are solved as one pinhole, through their own lenses, "
+                          "which stay as they are");
+  }
+  input.colmap = std::move(model);
   return input;
 }
 
@@ -272,16 +404,51 @@ bool IsColmapModel(const fs::path& folder) {
 
 }  // namespace
 
+std::string NameOf(const KnownRotationInput& input, FrameId view) {
+  const auto name = input.view_name.find(view);
+  return name == input.view_name.end() ? std::to_string(view.value) : name->second;
+}
+
+std::string NameOf(const KnownRotationInput& input, TrackId track) {
+  const auto name = input.track_name.find(track);
+  return name == input.track_name.end() ? std::to_string(track.value) : name->second;
+}
+
+KnownRotationInput WithViewsInOrder(const KnownRotationInput& input) {
+  KnownRotationInput ordered = input;
+  ordered.cam_from_world.clear();
+  ordered.timestamp_s.clear();
+  ordered.sigma_rad.clear();
+  ordered.view_name.clear();
+  std::map<FrameId, FrameId> number;
+  for (const auto& [view, rotation] : input.cam_from_world) {
+    const FrameId place{static_cast<int>(number.size())};
+    number[view] = place;
+    ordered.cam_from_world[place] = rotation;
+    const std::string name = NameOf(input, view);
+    ordered.view_name[place] = name;
+    const auto timestamp = input.timestamp_s.find(view);
+    ordered.timestamp_s[place] =
+        timestamp == input.timestamp_s.end() ? std::stod(name) : timestamp->second;
+    const auto sigma = input.sigma_rad.find(view);
+    if (sigma != input.sigma_rad.end()) ordered.sigma_rad[place] = sigma->second;
+  }
+  for (Track& track : ordered.tracks) {
+    std::erase_if(track.observations, [&](const Observation& observation) {
+      return !number.contains(observation.frame);
+    });
+    for (Observation& observation : track.observations) {
+      observation.frame = number.at(observation.frame);
+    }
+  }
+  return ordered;
+}
+
 KnownRotationInput ReadKnownRotation(const fs::path& path) {
   std::error_code error;
   if (fs::is_directory(path, error)) {
     if (IsColmapModel(path)) {
-      const ColmapModel model = ReadColmapModel(path);
-      KnownRotationInput input{
-          "COLMAP", model.camera, model.reconstruction.cam_from_world, {}, {}, {}};
-      input.tracks = model.reconstruction.tracks;
-      RefuseDoubles(path, input.tracks);
-      return input;
+      return FromColmap(std::make_shared<const ColmapModel>(ReadColmapModel(path)));
     }
     const fs::path ours = path / "known_rotation.txt";
     if (!fs::exists(ours)) {

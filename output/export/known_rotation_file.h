@@ -2,8 +2,11 @@
 
 #include <filesystem>
 #include <map>
+#include <memory>
 #include <string>
+#include <vector>
 
+#include "output/export/colmap_model.h"
 #include "rotodom/camera/camera.h"
 #include "rotodom/types/maps.h"
 #include "rotodom/types/reconstruction.h"
@@ -18,20 +21,35 @@ struct KnownRotationInput {
   std::map<FrameId, double> timestamp_s;  // where the file has them
   std::map<FrameId, double> sigma_rad;    // standard deviations of the orientations, where known
   std::vector<Track> tracks;
+  // What the file calls views and tracks, where that is not their number here.
+  std::map<FrameId, std::string> view_name;
+  std::map<TrackId, std::string> track_name;
+  std::vector<std::string> notes;             // what was merged or left out, one line each
+  std::shared_ptr<const ColmapModel> colmap;  // null: another kind of file
 };
+
+/// The name of a view or track in its file.
+std::string NameOf(const KnownRotationInput& input, FrameId view);
+std::string NameOf(const KnownRotationInput& input, TrackId track);
+
+/// The input with views numbered from 0 on, in their order, under the names that they had; a view
+/// without a time has its name's number for it, or its own.
+KnownRotationInput WithViewsInOrder(const KnownRotationInput& input);
 
 /// Reads orientations, tracks and camera; positions and points that a file brings besides are not
 /// looked at. What `path` is, is told by its content:
 ///   a run directory   its `known_rotation.txt`
 ///   ours              the text that WriteKnownRotation writes
-///   COLMAP            a folder with cameras, images and points3D, as .bin or .txt; one camera, or
-///                     several that are equal. Pixel centres move from one half to whole numbers.
+///   COLMAP            a folder with cameras, images and points3D, as .bin or .txt. Pixel centres
+///                     move from one half to whole numbers; several cameras as ColmapModel says.
 ///   BAL               `cameras points observations`, a line `camera point x y` per observation,
 ///                     then nine numbers per camera (rotation vector, translation, f, k1, k2) and
 ///                     three per point. The cameras' own lenses are taken out: the keypoints become
 ///                     those of one pinhole of the median focal length, axes turned from BAL's (y
 ///                     up, looking along -z) to ours.
-/// Every observation gets its bearing; those that the lens cannot show are left out.
+/// Every observation gets its bearing; those that the lens cannot show are left out. Two of a track
+/// in one view are merged where they are within a pixel, else both are left out; notes say so. Ids
+/// are whole numbers up to 2^64 - 1; beyond 2^31 - 1 they are numbered anew, and stay as names.
 /// Throws std::runtime_error in one line with file, line where there is one, and reason. Counts are
 /// checked against the file's size before anything is made of them.
 KnownRotationInput ReadKnownRotation(const std::filesystem::path& path);

@@ -46,14 +46,19 @@ Rotation TakeRollPitchYaw(GraphLine& line) {
          Rotation::Exp({angles.x(), 0.0, 0.0});
 }
 
-// The inverse of the rotation's block in the upper triangle of a 6x6 information.
-Eigen::Matrix3d TakeCovariance(GraphLine& line) {
-  for (int k = 0; k < 15; ++k) line.Number();
-  Eigen::Matrix3d information;
-  for (int r = 0; r < 3; ++r) {
-    for (int c = r; c < 3; ++c) information(r, c) = information(c, r) = line.Number();
+// A 6x6 information from its upper triangle.
+Eigen::Matrix<double, 6, 6> TakeInformation(GraphLine& line) {
+  Eigen::Matrix<double, 6, 6> information;
+  for (int r = 0; r < 6; ++r) {
+    for (int c = r; c < 6; ++c) information(r, c) = information(c, r) = line.Number();
   }
-  const Eigen::LLT<Eigen::Matrix3d> cholesky(information);
+  return information;
+}
+
+// The inverse of the rotation's block.
+Eigen::Matrix3d RotationCovariance(const GraphLine& line,
+                                   const Eigen::Matrix<double, 6, 6>& information) {
+  const Eigen::LLT<Eigen::Matrix3d> cholesky(information.bottomRightCorner<3, 3>());
   if (cholesky.info() != Eigen::Success) {
     line.Fail("the information of the rotation is not positive definite");
   }
@@ -81,6 +86,11 @@ bool IsWholeNumber(std::string_view word) {
 }
 
 bool IsNumberWord(std::string_view word) { return NumberIn(word).has_value(); }
+
+bool IsGraphTag(std::string_view word) {
+  return word.starts_with("VERTEX") || word.starts_with("EDGE") || word.starts_with("PARAMS") ||
+         word == "FIX";
+}
 
 RotationGraphInput ReadRotationGraphInput(const std::filesystem::path& path) {
   RotationGraphInput input;
@@ -136,16 +146,20 @@ double GraphLine::Number() {
 
 std::string GraphLine::Id() {
   const std::string_view word = Word();
-  const auto number_in = [&](auto value) -> std::optional<std::string> {
-    const char* begin = word.data() + (word.starts_with('+') ? 1 : 0);
-    const auto [stop, code] = std::from_chars(begin, word.data() + word.size(), value);
-    if (code != std::errc() || stop != word.data() + word.size()) return std::nullopt;
-    return std::to_string(value);
-  };
-  std::optional<std::string> id = number_in(std::uint64_t{0});
-  if (!id) id = number_in(std::int64_t{0});
-  if (!id) Fail("expected a vertex id, a whole number, found \"" + std::string(word) + "\"");
-  return *id;
+  if (!IsWholeNumber(word)) {
+    // "0.5" and "nan" are slips rather than names.
+    double value = 0.0;
+    const std::string_view unsigned_word = word.substr(word.front() == '+' ? 1 : 0);
+    const char* const end = unsigned_word.data() + unsigned_word.size();
+    if (std::from_chars(unsigned_word.data(), end, value).ptr == end) {
+      Fail("expected a view's id, a whole number or a name, found \"" + std::string(word) + "\"");
+    }
+    return std::string(word);
+  }
+  const bool is_negative = word.front() == '-';
+  std::string_view digits = word.substr(is_negative || word.front() == '+' ? 1 : 0);
+  digits.remove_prefix(std::min(digits.find_first_not_of('0'), digits.size() - 1));
+  return (is_negative && digits != "0" ? "-" : "") + std::string(digits);
 }
 
 Rotation GraphLine::Quaternion() {
@@ -190,13 +204,33 @@ void RotationGraphBuilder::AddVertex(const std::string& id,
   list_.center_in_world[view] = center_in_world;
 }
 
+void RotationGraphBuilder::AddTranslation(const EdgeTranslation& translation) {
+  list_.translations.push_back(translation);
+}
+
 void RotationGraphBuilder::Skip(const GraphLine& line, std::string_view tag) {
   constexpr std::size_t kMaxTags = 20;
   constexpr std::size_t kMaxTagLength = 40;
+  constexpr std::size_t kMaxLines = 3;
   std::string name(tag.substr(0, kMaxTagLength));
   if (skipped_.size() >= kMaxTags && !skipped_.contains(name)) name = "others";
   Skipped& skipped = skipped_[name];
-  if (skipped.count++ == 0) skipped.first_line = line.number();
+  ++skipped.count;
+  if (skipped.lines.size() < kMaxLines) skipped.lines.push_back(line.number());
+}
+
+// "3 lines of "EDGE_SE2" (12, 13, 14), 9 lines of "NOTE" (1, 2, 3 ...)".
+std::string RotationGraphBuilder::UnreadLines() const {
+  std::string text;
+  for (const auto& [tag, skipped] : skipped_) {
+    text += (text.empty() ? "" : ", ") + std::to_string(skipped.count) + " line" +
+            (skipped.count == 1 ? "" : "s") + " of \"" + tag + "\" (";
+    for (std::size_t k = 0; k < skipped.lines.size(); ++k) {
+      text += (k == 0 ? "" : ", ") + std::to_string(skipped.lines[k]);
+    }
+    text += static_cast<int>(skipped.lines.size()) < skipped.count ? " ...)" : ")";
+  }
+  return text;
 }
 
 void RotationGraphBuilder::ChooseReading(const std::vector<EdgeReading>& readings) {
@@ -210,19 +244,24 @@ void RotationGraphBuilder::ChooseReading(const std::vector<EdgeReading>& reading
 
 RotationList RotationGraphBuilder::Finish(const std::string& form) {
   list_.form = form;
-  std::string tags;
-  for (const auto& [tag, skipped] : skipped_) {
-    const std::string text = std::to_string(skipped.count) + " line" +
-                             (skipped.count == 1 ? "" : "s") + " of \"" + tag + "\"";
-    Note(text + " not used, the first in line " + std::to_string(skipped.first_line));
-    tags += (tags.empty() ? "; found " : ", ") + text;
-  }
+  list_.unread = UnreadLines();
   if (list_.edges.empty()) {
+    const auto count = [&](const char* tag) {
+      const auto found = skipped_.find(tag);
+      return found == skipped_.end() ? 0 : found->second.count;
+    };
+    const int num_plane = count("EDGE_SE2") + count("EDGE2");
+    if (num_plane > 0) {
+      throw std::runtime_error(path_.string() + ": is a 2-D graph (" + std::to_string(num_plane) +
+                               " edges of a pose in the plane); expected 3-D ones: "
+                               "EDGE_SE3:QUAT, EDGE3, or lines with two ids and a rotation");
+    }
     throw std::runtime_error(path_.string() +
                              ": has no edges: neither EDGE_SE3:QUAT, nor EDGE3, nor lines with two "
                              "ids and a rotation" +
-                             tags);
+                             (list_.unread.empty() ? "" : "; found " + list_.unread));
   }
+  if (list_.translations.size() != list_.edges.size()) list_.translations.clear();
   std::vector<int> order(list_.ids.size());
   for (std::size_t k = 0; k < order.size(); ++k) order[k] = static_cast<int>(k);
   std::sort(order.begin(), order.end(), [&](int a, int b) {
@@ -282,21 +321,32 @@ RotationList ReadPoseGraphLines(const RotationGraphInput& input,
     const std::string_view tag = line.Word();
     if (tag == "VERTEX_SE3:QUAT") {
       take_vertex(line, TakeQuaternion);
-    } else if (tag == "VERTEX3") {
+    } else if (tag == "VERTEX3" || tag == "VERTEX_SE3:EULER") {
       take_vertex(line, TakeRollPitchYaw);
-    } else if (tag == "EDGE_SE3:QUAT" || tag == "EDGE3") {
+    } else if (tag == "EDGE_SE3:QUAT" || tag == "EDGE3" || tag == "EDGE_SE3:EULER") {
       const bool is_g2o = tag == "EDGE_SE3:QUAT";
       const std::string i = line.Id();
       const std::string j = line.Id();
-      TakeVector(line);
+      EdgeTranslation translation;
+      translation.j_in_i = TakeVector(line);
       const Rotation i_from_j = is_g2o ? TakeQuaternion(line) : TakeRollPitchYaw(line);
       Eigen::Matrix3d covariance = isotropic;
+      if (is_g2o || !line.AtEnd()) {
+        translation.information = TakeInformation(line);
+        covariance = RotationCovariance(line, translation.information);
+      } else {
+        translation.information.bottomRightCorner<3, 3>() /= sigma_rad * sigma_rad;
+      }
       if (is_g2o) {
-        covariance = kReadInformationFactor * TakeCovariance(line);
-      } else if (!line.AtEnd()) {
-        covariance = TakeCovariance(line);
+        covariance *= kReadInformationFactor;
+      } else {
+        // Of the quaternion's vector part, half the rotation vector.
+        translation.information.topRightCorner<3, 3>() *= 2.0;
+        translation.information.bottomLeftCorner<3, 3>() *= 2.0;
+        translation.information.bottomRightCorner<3, 3>() *= kReadInformationFactor;
       }
       builder.AddEdge(line, i, j, i_from_j.Inverse(), covariance);
+      builder.AddTranslation(translation);
     } else if (tag == "FIX") {
       while (!line.AtEnd()) builder.Fix(line.Id());
     } else {
@@ -306,6 +356,26 @@ RotationList ReadPoseGraphLines(const RotationGraphInput& input,
   RotationList list = builder.Finish(form);
   list.is_pose_graph = true;
   return list;
+}
+
+std::map<std::string, Rotation> ReadOrientationLines(const RotationGraphInput& input) {
+  std::map<std::string, Rotation> cam_from_world;
+  const bool is_pose_graph = !input.first_words.empty() && IsGraphTag(input.first_words.front());
+  ForEachGraphLine(input, [&](GraphLine& line) {
+    if (!is_pose_graph) {
+      const std::string id = line.Id();
+      cam_from_world[id] = line.Quaternion();
+      return;
+    }
+    const std::string_view tag = line.Word();
+    if (!tag.starts_with("VERTEX")) return;
+    const bool has_angles = tag == "VERTEX3" || tag == "VERTEX_SE3:EULER";
+    if (!has_angles && tag != "VERTEX_SE3:QUAT") return;
+    const std::string id = line.Id();
+    TakeVector(line);
+    cam_from_world[id] = (has_angles ? TakeRollPitchYaw(line) : TakeQuaternion(line)).Inverse();
+  });
+  return cam_from_world;
 }
 
 }  // namespace rotslam

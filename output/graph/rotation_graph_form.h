@@ -42,6 +42,8 @@ RotationGraphInput ReadRotationGraphInput(const std::filesystem::path& path);
 
 bool IsWholeNumber(std::string_view word);
 bool IsNumberWord(std::string_view word);
+/// A word that stands in front of the lines of g2o and TORO.
+bool IsGraphTag(std::string_view word);
 
 /// The words of one line, taken one by one; blanks and commas separate them.
 class GraphLine {
@@ -52,7 +54,7 @@ class GraphLine {
   int number() const { return number_; }
   std::string_view Word();
   double Number();
-  /// A whole number as it is written without signs and zeros that say nothing.
+  /// A whole number as it is written without signs and zeros that say nothing, or a name.
   std::string Id();
   /// Of x y z w, unit; throws where it is none.
   Rotation Quaternion();
@@ -89,11 +91,13 @@ class RotationGraphBuilder {
                const std::string& j,
                const Rotation& j_from_i,
                const Eigen::Matrix3d& covariance);
+  /// What the last edge says beside its rotation.
+  void AddTranslation(const EdgeTranslation& translation);
   void AddVertex(const std::string& id,
                  const Rotation& cam_from_world,
                  const Eigen::Vector3d& center_in_world);
   void Fix(const std::string& id) { fixed_.push_back(id); }
-  /// A line that is not read, under the word in front; notes count them.
+  /// A line that is not read, under the word in front.
   void Skip(const GraphLine& line, std::string_view tag);
   void Note(std::string note) { list_.notes.push_back(std::move(note)); }
   /// Edges in the reading that their cycles tell.
@@ -104,8 +108,9 @@ class RotationGraphBuilder {
  private:
   struct Skipped {
     int count = 0;
-    int first_line = 0;
+    std::vector<int> lines;  // the first of them
   };
+  std::string UnreadLines() const;
   int ViewOf(const std::string& id);
 
   std::filesystem::path path_;
@@ -119,6 +124,10 @@ class RotationGraphBuilder {
 RotationList ReadPoseGraphLines(const RotationGraphInput& input,
                                 double sigma_rad,
                                 const std::string& form);
+
+/// Orientations by id: vertices of a pose graph, or lines `id qx qy qz qw` with or without numbers
+/// behind (cam_from_world).
+std::map<std::string, Rotation> ReadOrientationLines(const RotationGraphInput& input);
 
 /// Nine numbers by rows; throws std::runtime_error through `line` where they are no rotation.
 Rotation RotationOfNine(const GraphLine& line, const std::array<double, 9>& numbers);

@@ -191,18 +191,15 @@ std::vector<MapTrack> JoinTracks(const std::vector<Track>& tracks, const Reconst
   return list;
 }
 
-RunMap KeyframesOnly(const RunMap& map) {
+RunMap PartOf(const RunMap& map, const std::set<FrameId>& frames) {
   RunMap part;
   part.camera = map.camera;
   part.image_folder = map.image_folder;
   part.is_video = map.is_video;
   part.level_scale = map.level_scale;
   part.num_levels = map.num_levels;
-  std::set<FrameId> kept;
   for (const MapFrame& frame : map.frames) {
-    if (!frame.is_keyframe) continue;
-    kept.insert(frame.id);
-    part.frames.push_back(frame);
+    if (frames.contains(frame.id)) part.frames.push_back(frame);
   }
   for (const MapTrack& entry : map.tracks) {
     MapTrack shorter;
@@ -210,7 +207,7 @@ RunMap KeyframesOnly(const RunMap& map) {
     shorter.track.rgb = entry.track.rgb;
     shorter.point_in_world = entry.point_in_world;
     for (std::size_t k = 0; k < entry.fits.size(); ++k) {
-      if (!kept.contains(entry.track.observations[k].frame)) continue;
+      if (!frames.contains(entry.track.observations[k].frame)) continue;
       shorter.track.observations.push_back(entry.track.observations[k]);
       shorter.fits.push_back(entry.fits[k]);
       shorter.levels.push_back(entry.levels[k]);
@@ -218,10 +215,20 @@ RunMap KeyframesOnly(const RunMap& map) {
     if (!shorter.fits.empty()) part.tracks.push_back(std::move(shorter));
   }
   for (const MapEdge& edge : map.edges) {
-    if (kept.contains(edge.i) && kept.contains(edge.j)) part.edges.push_back(edge);
+    if (frames.contains(edge.i) && frames.contains(edge.j)) part.edges.push_back(edge);
   }
   return part;
 }
+
+std::set<FrameId> KeyframesOf(const RunMap& map) {
+  std::set<FrameId> keyframes;
+  for (const MapFrame& frame : map.frames) {
+    if (frame.is_keyframe) keyframes.insert(frame.id);
+  }
+  return keyframes;
+}
+
+RunMap KeyframesOnly(const RunMap& map) { return PartOf(map, KeyframesOf(map)); }
 
 Reconstruction ToReconstruction(const RunMap& map) {
   Reconstruction reconstruction;

@@ -3,6 +3,7 @@
 #include <cstdint>
 #include <filesystem>
 #include <optional>
+#include <set>
 #include <string>
 #include <vector>
 
@@ -59,8 +60,12 @@ struct RunMap {
 ///                track and frame; only tracks with a point count.
 std::vector<MapTrack> JoinTracks(const std::vector<Track>& tracks, const Reconstruction& solved);
 
-/// The part of a map that stands on its keyframes: other frames go, and their sightings, and tracks
-/// left without one.
+/// The part of a map that has only `frames`: the other frames are left out, and their sightings,
+/// tracks without any sighting left, and edges at them.
+RunMap PartOf(const RunMap& map, const std::set<FrameId>& frames);
+
+/// The keyframes of a map, and the part of it that has only them.
+std::set<FrameId> KeyframesOf(const RunMap& map);
 RunMap KeyframesOnly(const RunMap& map);
 
 /// Points, and the sightings that fit, of the frames in the map.

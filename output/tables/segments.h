@@ -10,8 +10,8 @@ namespace rotslam {
 struct Segment {
   int first_frame = 0;
   int last_frame = 0;  // inclusive
-  std::string kind;    // translating, rotating or still
-  int component = -1;  // part of the map whose scale is one; -1 where there is no map
+  std::string kind;    // translating, rotating, still or unplaced
+  int component = -1;  // part of the map whose scale is one; -1 where nothing places the frames
   // How its scale is tied to the rest: reference (it is the scale), tracks (points seen before and
   // after a turn in place), continuity (by default, nothing measures it) or none (no map).
   std::string scale;

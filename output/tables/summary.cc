@@ -94,6 +94,8 @@ std::string SummaryJson(const RunSummary& summary) {
   if (summary.camera) json["camera"] = CameraToJson(*summary.camera);
   if (summary.calibration) json["calibration"] = TableToJson(*summary.calibration);
   if (summary.readout) json["readout"] = TableToJson(*summary.readout);
+  if (summary.masks) json["masks"] = TableToJson(*summary.masks);
+  if (summary.lens_checks) json["lens_checks"] = TableToJson(*summary.lens_checks);
   json["counts"] = TableToJson(summary.counts);
   json["seconds"] = TableToJson(summary.seconds);
   if (summary.rotodom) json["rotodom"] = TableToJson(*summary.rotodom);

@@ -42,6 +42,8 @@ struct RunSummary {
   std::optional<Camera> camera;
   std::optional<SummaryTable> calibration;  // of a camera that no calibration file gives
   std::optional<SummaryTable> readout;      // of a sensor that no calibration file tells of
+  std::optional<SummaryTable> masks;        // absent where nothing is masked
+  std::optional<SummaryTable> lens_checks;  // absent where nothing speaks against the calibration
   SummaryTable counts;
   SummaryTable seconds;
   std::optional<SummaryTable> rotodom;

@@ -2,10 +2,14 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <stdexcept>
 
+#include <Eigen/Eigenvalues>
+#include <Eigen/OrderingMethods>
 #include <Eigen/SparseCholesky>
 
+#include "rotodom/averaging/fill.h"
 #include "rotodom/averaging/laplacian_solver.h"
 
 namespace rotslam {
@@ -166,20 +170,113 @@ Eigen::SparseMatrix<double> DualMatrix(const Chords& chords) {
   return S;
 }
 
+// The smallest eigenvalue of a symmetric matrix, from above, by Lanczos' method with full
+// orthogonalisation: a hint only.
+double EstimateSmallestEigenvalue(const Eigen::SparseMatrix<double>& S) {
+  constexpr int kMaxBasis = 60;
+  const Eigen::Index n = S.rows();
+  const int size = static_cast<int>(std::min<Eigen::Index>(kMaxBasis, n));
+  Eigen::MatrixXd basis(n, size);
+  Eigen::VectorXd diagonal = Eigen::VectorXd::Zero(size);
+  Eigen::VectorXd beside = Eigen::VectorXd::Zero(size);
+  Eigen::VectorXd v(n);
+  // Any start that is not orthogonal to the eigenvector; the same in every run.
+  for (Eigen::Index k = 0; k < n; ++k) v[k] = std::sin(1.0 + 1.7 * static_cast<double>(k));
+  v.normalize();
+  int used = 0;
+  for (int k = 0; k < size; ++k) {
+    basis.col(k) = v;
+    ++used;
+    Eigen::VectorXd w = S.selfadjointView<Eigen::Lower>() * v;
+    diagonal[k] = w.dot(v);
+    for (int pass = 0; pass < 2; ++pass) {
+      w -= basis.leftCols(k + 1) * (basis.leftCols(k + 1).transpose() * w);
+    }
+    const double length = w.norm();
+    if (!(length > 1e-14 * std::abs(diagonal[0])) || k + 1 == size) break;
+    beside[k] = length;
+    v = w / length;
+  }
+  Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> eigen;
+  eigen.computeFromTridiagonal(
+      diagonal.head(used), beside.head(std::max(0, used - 1)), Eigen::EigenvaluesOnly);
+  return eigen.eigenvalues().minCoeff();
+}
+
+// Rows and columns of S in an order of the views that keeps its factor sparse.
+Eigen::SparseMatrix<double> InSparseOrder(const Eigen::SparseMatrix<double>& S,
+                                          const Chords& chords,
+                                          CertificateProgress& progress) {
+  const int n = chords.num_views();
+  std::vector<Eigen::Triplet<double>> pattern;
+  pattern.reserve(chords.edges.size() + chords.views.size());
+  for (int view = 0; view < n; ++view) pattern.emplace_back(view, view, 1.0);
+  for (const Chord& edge : chords.edges) {
+    pattern.emplace_back(std::max(edge.i, edge.j), std::min(edge.i, edge.j), 1.0);
+  }
+  Eigen::SparseMatrix<double> lower(n, n);
+  lower.setFromTriplets(pattern.begin(), pattern.end());
+  Eigen::PermutationMatrix<Eigen::Dynamic, Eigen::Dynamic, int> order;
+  Eigen::AMDOrdering<int>()(lower.selfadjointView<Eigen::Lower>(), order);
+  std::vector<int> position(chords.views.size());
+  for (int k = 0; k < n; ++k) position[order.indices()[k]] = k;
+  for (Eigen::Triplet<double>& entry : pattern) {
+    const int a = position[entry.row()];
+    const int b = position[entry.col()];
+    entry = Eigen::Triplet<double>(std::min(a, b), std::max(a, b), 1.0);
+  }
+  Eigen::SparseMatrix<double> upper(n, n);
+  upper.setFromTriplets(pattern.begin(), pattern.end());
+  const CholeskyFill fill = CountFill(upper, std::numeric_limits<double>::infinity());
+  progress.entries = 9.0 * fill.entries;
+  progress.products = 27.0 * fill.products;
+
+  std::vector<Eigen::Triplet<double>> entries;
+  entries.reserve(static_cast<std::size_t>(S.nonZeros()));
+  for (int column = 0; column < S.outerSize(); ++column) {
+    for (Eigen::SparseMatrix<double>::InnerIterator entry(S, column); entry; ++entry) {
+      const int row = static_cast<int>(entry.row());
+      const int a = 3 * position[row / 3] + row % 3;
+      const int b = 3 * position[column / 3] + column % 3;
+      entries.emplace_back(std::max(a, b), std::min(a, b), entry.value());
+    }
+  }
+  Eigen::SparseMatrix<double> ordered(S.rows(), S.cols());
+  ordered.setFromTriplets(entries.begin(), entries.end());
+  return ordered;
+}
+
 // An epsilon for which S + epsilon I is positive definite, within a factor of two of the smallest.
-double SmallestShift(const Eigen::SparseMatrix<double>& S) {
-  Eigen::SimplicialLDLT<Eigen::SparseMatrix<double>> ldlt;
+double SmallestShift(const Eigen::SparseMatrix<double>& dual,
+                     const Chords& chords,
+                     const std::function<void(const CertificateProgress&)>& observe) {
+  CertificateProgress progress;
+  const Eigen::SparseMatrix<double> S = InSparseOrder(dual, chords, progress);
+  if (observe) observe(progress);
+  Eigen::SimplicialLDLT<Eigen::SparseMatrix<double>, Eigen::Lower, Eigen::NaturalOrdering<int>>
+      ldlt;
   ldlt.analyzePattern(S);
   const double scale = std::max(S.diagonal().maxCoeff(), 1e-300);
   const auto is_definite = [&](double shift) {
     ldlt.setShift(shift * scale);
     ldlt.factorize(S);
+    ++progress.factorisations;
+    if (observe) observe(progress);
     return ldlt.info() == Eigen::Success && ldlt.vectorD().minCoeff() > 0.0;
   };
   if (is_definite(kFirstShift)) return kFirstShift * scale;
   double low = kFirstShift;
   double high = kLastShift;
-  while (high > 2.0 * low) {
+  // The estimate is no larger in size than the eigenvalue: most often one more factorisation, at
+  // somewhat more than it, is the last.
+  const double estimate = -EstimateSmallestEigenvalue(dual) / scale;
+  low = std::clamp(estimate, low, 0.5 * high);
+  if (const double next = 2.0 * low; is_definite(next)) {
+    high = next;
+  } else {
+    low = next;
+  }
+  while (high > 2.0 * low * (1.0 + 1e-9)) {
     const double middle = std::sqrt(low * high);
     (is_definite(middle) ? high : low) = middle;
   }
@@ -188,9 +285,11 @@ double SmallestShift(const Eigen::SparseMatrix<double>& S) {
 
 }  // namespace
 
-AveragingCertificate CertifyAveraging(std::span<const RelativeRotation> edges,
-                                      std::span<const double> weights,
-                                      const RotationMap& cam_from_world) {
+AveragingCertificate CertifyAveraging(
+    std::span<const RelativeRotation> edges,
+    std::span<const double> weights,
+    const RotationMap& cam_from_world,
+    const std::function<void(const CertificateProgress&)>& observe) {
   Chords chords = MakeChords(edges, weights, cam_from_world);
   AveragingCertificate certificate;
   if (chords.edges.empty()) {
@@ -206,7 +305,7 @@ AveragingCertificate CertifyAveraging(std::span<const RelativeRotation> edges,
         std::max(certificate.gradient, descent.segment<3>(3 * view).norm() / weight);
   }
   certificate.cost = Cost(chords);
-  certificate.smallest_eigenvalue = -SmallestShift(DualMatrix(chords));
+  certificate.smallest_eigenvalue = -SmallestShift(DualMatrix(chords), chords, observe);
   // The sum of squares of all orientations' entries is 3 n.
   certificate.cost_bound =
       std::max(0.0, certificate.cost + 3.0 * chords.num_views() * certificate.smallest_eigenvalue);

@@ -68,13 +68,6 @@ Views ViewsOf(const GlobalAveragingProblem& problem) {
   return views;
 }
 
-Eigen::Matrix3d ErrorCovariance(const RelativeRotation& edge,
-                                const GlobalAveragingOptions& options) {
-  const double floor_rad = options.edge_floor_deg * kRadFromDeg;
-  return options.error_factor * options.error_factor * edge.covariance +
-         floor_rad * floor_rad * Eigen::Matrix3d::Identity();
-}
-
 std::vector<ConsensusEdge> ConsensusEdges(const GlobalAveragingProblem& problem,
                                           const Views& views,
                                           const GlobalAveragingOptions& options) {
@@ -240,6 +233,36 @@ std::optional<std::string> GlobalAveragingOptions::Problem() const {
   if (!(min_step_deg > 0.0)) return OutOfRange("min_step_deg", min_step_deg, "positive");
   if (max_iterations < 1) return OutOfRange("max_iterations", max_iterations, "at least 1");
   return std::nullopt;
+}
+
+Eigen::Matrix3d ErrorCovariance(const RelativeRotation& edge,
+                                const GlobalAveragingOptions& options) {
+  const double floor_rad = options.edge_floor_deg * kRadFromDeg;
+  return options.error_factor * options.error_factor * edge.covariance +
+         floor_rad * floor_rad * Eigen::Matrix3d::Identity();
+}
+
+void ReportEdges(std::span<const RelativeRotation> edges,
+                 const GlobalAveragingOptions& options,
+                 GlobalAveragingResult& result) {
+  const double squared_loss = options.loss_sigmas * options.loss_sigmas;
+  result.angle_rad.clear();
+  result.sigmas.clear();
+  result.cost = 0.0;
+  result.num_inliers = 0;
+  for (const RelativeRotation& edge : edges) {
+    // The error delta in Exp(delta) * j_from_i, in the frame of camera j.
+    const Eigen::Vector3d delta =
+        (result.cam_from_world.at(edge.j) * result.cam_from_world.at(edge.i).Inverse() *
+         edge.j_from_i.Inverse())
+            .Log();
+    const double squared =
+        std::max(0.0, delta.dot(ErrorCovariance(edge, options).llt().solve(delta)));
+    result.angle_rad.push_back(delta.norm());
+    result.sigmas.push_back(std::sqrt(squared));
+    result.cost += squared_loss * squared / (squared_loss + squared);
+    result.num_inliers += result.sigmas.back() <= options.loss_sigmas ? 1 : 0;
+  }
 }
 
 GlobalAveragingResult AverageGlobally(const GlobalAveragingProblem& problem,

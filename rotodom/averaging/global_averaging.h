@@ -101,6 +101,16 @@ GlobalAveragingResult AverageGlobally(const GlobalAveragingProblem& problem,
                                       const GlobalAveragingOptions& options,
                                       int num_threads);
 
+/// Fills what a result says of its edges (angle_rad, sigmas, cost, num_inliers) anew for its
+/// cam_from_world, which may have been changed.
+void ReportEdges(std::span<const RelativeRotation> edges,
+                 const GlobalAveragingOptions& options,
+                 GlobalAveragingResult& result);
+
+/// The covariance that averaging takes an edge to have.
+Eigen::Matrix3d ErrorCovariance(const RelativeRotation& edge,
+                                const GlobalAveragingOptions& options);
+
 /// The same for the drifted orientations of an odometry and a view-graph with loops: all views are
 /// averaged with the first one fixed. A loop is accepted when it disagrees by no more than the
 /// drift expected from the edges between its ends, however many of its own standard deviations that

@@ -2,10 +2,11 @@
 
 #include <algorithm>
 #include <cmath>
-#include <cstdint>
 
 #include <Eigen/LU>
 #include <Eigen/OrderingMethods>
+
+#include "rotodom/averaging/fill.h"
 
 namespace rotslam {
 namespace {
@@ -79,30 +80,11 @@ void LaplacianSolver::Analyze(std::span<const LaplacianEdge> edges) {
   factor_.analyzePattern(upper_);
 }
 
-// Counts the factor's columns by walking up the elimination tree, row by row (Davis, Direct Methods
-// for Sparse Linear Systems, ch. 4), and stops when they are too many.
 bool LaplacianSolver::FillIsAffordable(const Eigen::SparseMatrix<double>& upper,
-                                       std::size_t num_edges) const {
+                                       std::size_t num_edges) {
   const double limit =
       std::max(kAlwaysAffordable, kMaxProductsPerEdge * static_cast<double>(num_edges));
-  std::vector<int> parent(static_cast<std::size_t>(num_free_), -1);
-  std::vector<int> visited(static_cast<std::size_t>(num_free_), -1);
-  std::vector<std::int64_t> count(static_cast<std::size_t>(num_free_), 0);
-  double products = 0.0;
-  for (int k = 0; k < num_free_; ++k) {
-    visited[k] = k;
-    for (int p = upper.outerIndexPtr()[k]; p < upper.outerIndexPtr()[k + 1]; ++p) {
-      for (int i = upper.innerIndexPtr()[p]; i < k && visited[i] != k; i = parent[i]) {
-        if (parent[i] < 0) parent[i] = k;
-        // The sum of the columns' squared counts.
-        products += static_cast<double>(2 * count[i] + 1);
-        ++count[i];
-        visited[i] = k;
-      }
-    }
-    if (products > limit) return false;
-  }
-  return true;
+  return CountFill(upper, limit).is_complete;
 }
 
 bool LaplacianSolver::Factorize(std::span<const LaplacianEdge> edges) {

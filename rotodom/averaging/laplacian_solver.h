@@ -48,7 +48,7 @@ class LaplacianSolver {
   bool HasNewStructure(std::span<const LaplacianEdge> edges) const;
   void Analyze(std::span<const LaplacianEdge> edges);
   bool Factorize(std::span<const LaplacianEdge> edges);
-  bool FillIsAffordable(const Eigen::SparseMatrix<double>& upper, std::size_t num_edges) const;
+  static bool FillIsAffordable(const Eigen::SparseMatrix<double>& upper, std::size_t num_edges);
   void SetDiagonal(std::span<const LaplacianEdge> edges, double damping);
   void Multiply(std::span<const LaplacianEdge> edges,
                 const Eigen::VectorXd& x,

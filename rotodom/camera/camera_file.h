@@ -5,7 +5,10 @@
 #include <string>
 #include <vector>
 
+#include <Eigen/Core>
+
 #include "rotodom/camera/camera.h"
+#include "rotodom/camera/lens_sigmas.h"
 
 namespace rotslam {
 
@@ -19,6 +22,10 @@ struct NamedCamera {
   std::optional<double> view_angle_x_rad;
   // Set: the camera cannot be read; the error in one line, thrown once somebody asks for it.
   std::string problem;
+  // How well the lens is known; nullopt: the file does not say.
+  std::optional<LensSigmas> sigmas = {};
+  // Parts of the image that show no scene, px: corner points of polygons.
+  std::vector<std::vector<Eigen::Vector2d>> masked_px = {};
 };
 
 /// What a calibration file says.

@@ -6,6 +6,7 @@
 #include <cstddef>
 #include <fstream>
 #include <iterator>
+#include <span>
 #include <stdexcept>
 #include <string>
 #include <system_error>
@@ -185,6 +186,12 @@ std::string NumberText(double value) {
   return {buffer, result.ptr};
 }
 
+std::string ListText(std::span<const double> values) {
+  std::string text = "[";
+  for (const double value : values) text += (text.size() > 1 ? ", " : "") + NumberText(value);
+  return text + "]";
+}
+
 }  // namespace
 
 std::string CameraFormNames() {
@@ -281,7 +288,7 @@ Camera ReadCamera(const CameraReference& reference,
 
 Camera ReadCamera(const fs::path& file) { return ReadCamera(CameraReference{file, ""}); }
 
-std::string CameraYaml(const Camera& camera) {
+std::string CameraYaml(const Camera& camera, const std::optional<LensSigmas>& sigmas) {
   std::string text = "model: " + std::string(Name(camera.model)) + "\n";
   text += "width: " + std::to_string(camera.width) + "\n";
   text += "height: " + std::to_string(camera.height) + "\n";
@@ -290,24 +297,27 @@ std::string CameraYaml(const Camera& camera) {
   text += "cx: " + NumberText(camera.cx) + "\n";
   text += "cy: " + NumberText(camera.cy) + "\n";
   const std::size_t count = DistortionNames(camera.model).size();
-  text += "distortion: [";
-  for (std::size_t k = 0; k < count; ++k) {
-    if (k > 0) text += ", ";
-    text += NumberText(camera.distortion[k]);
-  }
-  text += "]\n";
+  text += "distortion: " + ListText({camera.distortion.data(), count}) + "\n";
   if (camera.knows_readout) text += "readout_s: " + NumberText(camera.readout_s) + "\n";
   if (camera.readout_s > 0.0) {
     text += "readout_from: " + std::string(Name(camera.readout_from)) + "\n";
   }
+  if (!sigmas) return text;
+  text += "sigma_focal_px: " + NumberText(sigmas->focal_px) + "\n";
+  text += "sigma_cx_px: " + NumberText(sigmas->cx_px) + "\n";
+  text += "sigma_cy_px: " + NumberText(sigmas->cy_px) + "\n";
+  const auto num_sigmas = static_cast<std::size_t>(NumLensCoefficients(camera.model));
+  text += "sigma_distortion: " + ListText({sigmas->distortion.data(), num_sigmas}) + "\n";
   return text;
 }
 
-void WriteCameraYaml(const fs::path& file, const Camera& camera) {
+void WriteCameraYaml(const fs::path& file,
+                     const Camera& camera,
+                     const std::optional<LensSigmas>& sigmas) {
   if (const auto problem = camera.Problem()) throw std::invalid_argument("camera: " + *problem);
   const fs::path beside = file.string() + ".tmp";
   std::ofstream stream(beside, std::ios::binary);
-  stream << CameraYaml(camera);
+  stream << CameraYaml(camera, sigmas);
   stream.close();
   std::error_code error;
   if (stream) fs::rename(beside, file, error);

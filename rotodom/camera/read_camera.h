@@ -30,6 +30,14 @@ namespace rotslam {
 ///   not
 ///                                    # known, and 0
 ///   readout_from: top                # its first row: top, bottom, left or right; left out: top
+///   sigma_focal_px: 0.4              # standard deviations, of fx and fy together; left out:
+///   nobody sigma_cx_px: 0.5                 # knows, as for all other forms; all of them or none,
+///   0: exact sigma_cy_px: 0.6 sigma_distortion: [0.001, 0.002, 0.0001, 0.0001, 0.002]  # of the
+///   first coefficients, five at
+///                                    # most; five of a pinhole's, those of radtan
+///   masked_px: [[[0, 400], [752, 400], [752, 480], [0, 480]]]  # polygons of corners x, y: parts
+///   of
+///                                    # the image to be ignored (a bonnet, a mount); left out: none
 /// radtan may leave k3 out; pinhole has no distortion. Unknown keys are errors.
 ///
 /// Throws std::runtime_error in one line, "file:line: key is 'x', must be ...": no such file, no
@@ -71,10 +79,13 @@ Camera ReadCamera(const CameraReference& reference,
 Camera ReadCamera(const std::filesystem::path& file);
 
 /// `camera` in our own form; ReadCamera gives back the very same numbers.
-std::string CameraYaml(const Camera& camera);
+/// @param sigmas  how well the lens is known; nullopt: nobody knows.
+std::string CameraYaml(const Camera& camera, const std::optional<LensSigmas>& sigmas = {});
 
-/// Writes CameraYaml(camera), beside first, then renamed. Throws std::runtime_error when it cannot,
-/// std::invalid_argument when camera.Problem().
-void WriteCameraYaml(const std::filesystem::path& file, const Camera& camera);
+/// Writes CameraYaml(camera, sigmas), beside first, then renamed. Throws std::runtime_error when it
+/// cannot, std::invalid_argument when camera.Problem().
+void WriteCameraYaml(const std::filesystem::path& file,
+                     const Camera& camera,
+                     const std::optional<LensSigmas>& sigmas = {});
 
 }  // namespace rotslam

@@ -1,17 +1,12 @@
 #pragma once
 
+#include "rotodom/simd/simd_level.h"
+
 namespace rotslam {
 
-/// Whether this machine has AVX2. Some loops are compiled twice, with and without AVX2; both
-/// variants give identical results.
-inline bool HasAvx2() {
-#if defined(__x86_64__)
-  static const bool has = __builtin_cpu_supports("avx2") != 0;
-  return has;
-#else
-  return false;
-#endif
-}
+/// Whether loops compiled for AVX2 may be used. They are compiled twice, with and without AVX2;
+/// both variants give identical results.
+inline bool HasAvx2() { return UsedSimdLevel() >= SimdLevel::kAvx2; }
 
 // Marks a function compiled for AVX2 but not for fused multiply-adds, which round differently.
 #if defined(__x86_64__)

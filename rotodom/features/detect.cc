@@ -226,19 +226,32 @@ std::vector<cv::Point> ChooseInRounds(Candidates candidates,
   return chosen;
 }
 
-// Up to `room` new corners of a level that should have `count` in all.
-std::vector<cv::Point> DetectOnLevel(const cv::Mat& image,
+// How many corners a level should have in all, and how many of them are new.
+struct LevelCounts {
+  int all = 0;
+  int room = 0;
+};
+
+// New corners of a level.
+std::vector<cv::Point> DetectOnLevel(const ImagePyramid& pyramid,
+                                     int level,
                                      const std::vector<Eigen::Vector2d>& carried,
-                                     int count,
-                                     int room,
+                                     const LevelCounts& counts,
                                      const FeatureOptions& options) {
+  const cv::Mat& image = pyramid.levels[level];
   const cv::Rect area(kBorder, kBorder, image.cols - 2 * kBorder, image.rows - 2 * kBorder);
-  if (area.width <= 0 || area.height <= 0 || room <= 0) return {};
-  const Grid grid(area, count);
+  if (area.width <= 0 || area.height <= 0 || counts.room <= 0) return {};
+  const Grid grid(area, counts.all);
   Taken taken(grid, options.min_distance_px);
   for (const Eigen::Vector2d& position : carried) taken.Add(position);
-  const std::vector<FastCorner> corners = FindFastCorners(image, area, options.min_fast_threshold);
-  return ChooseInRounds(SortIntoCells(corners, grid, options.fast_threshold), grid, room, taken);
+  std::vector<FastCorner> corners = FindFastCorners(image, area, options.min_fast_threshold);
+  if (!pyramid.mask.IsEmpty()) {
+    std::erase_if(corners, [&](const FastCorner& corner) {
+      return pyramid.IsMasked(pyramid.ToImage(Eigen::Vector2d(corner.x, corner.y), level), level);
+    });
+  }
+  return ChooseInRounds(
+      SortIntoCells(corners, grid, options.fast_threshold), grid, counts.room, taken);
 }
 
 }  // namespace
@@ -280,7 +293,7 @@ void DetectFeatures(const ImagePyramid& pyramid,
   std::vector<std::vector<cv::Point>> corners(num_levels);
   ParallelFor(num_levels, num_threads, [&](int level) {
     corners[level] =
-        DetectOnLevel(pyramid.levels[level], carried[level], counts[level], room[level], options);
+        DetectOnLevel(pyramid, level, carried[level], {counts[level], room[level]}, options);
   });
   for (int level = 0; level < num_levels; ++level) {
     for (const cv::Point& corner : corners[level]) {

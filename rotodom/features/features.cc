@@ -62,15 +62,16 @@ void ColourFeatures(const cv::Mat& image, Features& features, int first) {
   }
 }
 
-Features ExtractFeatures(const cv::Mat& image,
+Features ExtractFeatures(const MaskedImage& masked,
                          FrameId frame,
                          const Camera& camera,
                          const FeatureOptions& options,
                          int num_threads) {
+  const cv::Mat& image = masked.image;
   CheckImage(image, "ExtractFeatures");
   Features features;
   features.frame = frame;
-  const ImagePyramid pyramid = BuildPyramid(ToGrey(image), options);
+  const ImagePyramid pyramid = BuildPyramid(ToGrey(image), options, masked.mask);
   DetectFeatures(pyramid, camera, options, num_threads, features);
   DescribeFeatures(pyramid, num_threads, features);
   ColourFeatures(image, features);

@@ -10,6 +10,7 @@
 #include <opencv2/core.hpp>
 
 #include "rotodom/camera/camera.h"
+#include "rotodom/masks/mask.h"
 #include "rotodom/types/ids.h"
 
 namespace rotslam {
@@ -42,14 +43,23 @@ struct FeatureOptions {
   }
 };
 
+// Radius of the circle of pixels that makes a FAST corner.
+inline constexpr double kCornerReachPx = 3.0;
+
 /// A frame's image at all scales, each 1 / scale_factor of the one before.
 struct ImagePyramid {
   std::vector<cv::Mat> levels;          // 8-bit grey; level 0 shares the image's pixels
   std::vector<Eigen::Vector2d> scales;  // image pixels per pixel of the level, in x and y
+  Mask mask;                            // what has no features, in the full image
 
   // Pixel centres map to pixel centres: (x + 1/2) * scale - 1/2.
   Eigen::Vector2d ToLevel(const Eigen::Vector2d& image_px, int level) const;
   Eigen::Vector2d ToImage(const Eigen::Vector2d& level_px, int level) const;
+
+  // Whether a corner of the level at this position of the full image touches what is masked.
+  bool IsMasked(const Eigen::Vector2d& image_px, int level) const {
+    return mask.Covers(image_px, kCornerReachPx * scales[level].x());
+  }
 };
 
 /// One frame's corners, n of them.
@@ -81,7 +91,10 @@ cv::Mat ToGrey(const cv::Mat& image);
 /// Builds options.num_levels levels, each by bilinear interpolation from the one before; no side is
 /// below one pixel.
 /// @param grey  8-bit, one channel; must not change while the pyramid is in use.
-ImagePyramid BuildPyramid(const cv::Mat& grey, const FeatureOptions& options);
+/// @param mask  of its size, or empty; throws std::invalid_argument for another size.
+ImagePyramid BuildPyramid(const cv::Mat& grey,
+                          const FeatureOptions& options,
+                          const Mask& mask = {});
 
 /// Detects corners where `features` has none, up to options.max_features in all, evenly spread.
 /// @param num_threads  works on levels side by side; the result does not depend on it.
@@ -90,7 +103,8 @@ ImagePyramid BuildPyramid(const cv::Mat& grey, const FeatureOptions& options);
 ///                     new ones are appended, ordered by level, row and column, at whole pixels of
 ///                     their level, with the grey value as colour. Angles and descriptors are not
 ///                     changed.
-/// Corners for which the camera model has no bearing are left out. Each part of a level has a share
+/// Corners that touch the pyramid's mask, or for which the camera model has no bearing, are left
+/// out. Each part of a level has a share
 /// of the features, and carried features count towards it.
 /// Source:  Rublee et al., ORB, ICCV 2011. Ours selects the FAST corners of a level in rounds over
 ///          a grid, strongest first, so that each part of the image gets its share.
@@ -115,10 +129,10 @@ void DescribeFeatures(const ImagePyramid& pyramid,
 void ColourFeatures(const cv::Mat& image, Features& features, int first = 0);
 
 /// Pyramid, detection, description and colours of a single frame.
-/// @param image  8-bit, one or three channels (BGR).
+/// @param image  8-bit, one or three channels (BGR); masked parts have no features.
 /// @return  at most options.max_features features, ordered by level, row and column; none for an
 /// image without corners.
-Features ExtractFeatures(const cv::Mat& image,
+Features ExtractFeatures(const MaskedImage& image,
                          FrameId frame,
                          const Camera& camera,
                          const FeatureOptions& options,

@@ -165,14 +165,18 @@ Eigen::Vector2d ImagePyramid::ToImage(const Eigen::Vector2d& level_px, int level
   return (level_px.array() + 0.5).cwiseProduct(scales[level].array()) - 0.5;
 }
 
-ImagePyramid BuildPyramid(const cv::Mat& grey, const FeatureOptions& options) {
+ImagePyramid BuildPyramid(const cv::Mat& grey, const FeatureOptions& options, const Mask& mask) {
   if (const auto problem = options.Problem()) {
     throw std::invalid_argument("FeatureOptions: " + *problem);
   }
   if (grey.empty() || grey.type() != CV_8UC1) {
     throw std::invalid_argument("BuildPyramid: the image must be 8-bit grey");
   }
+  if (!mask.IsEmpty() && mask.size() != grey.size()) {
+    throw std::invalid_argument("BuildPyramid: the mask has not the image's size");
+  }
   ImagePyramid pyramid;
+  pyramid.mask = mask;
   pyramid.levels.push_back(grey);
   pyramid.scales.emplace_back(1.0, 1.0);
   for (int level = 1; level < options.num_levels; ++level) {

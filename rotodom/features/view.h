@@ -16,6 +16,8 @@ struct View {
   double timestamp_s = 0.0;
   // Per feature: image motion that the camera's rotation does not explain.
   std::vector<Eigen::Vector2d> flow_px_per_s;
+  // Per feature: its bearing before CorrectRollingShutter; empty where that has to be computed.
+  std::vector<Eigen::Vector3d> seen_bearings;
   // Per feature: an outlier of its frame's edges, no longer tracked.
   std::vector<bool> is_lost;
 };

@@ -37,8 +37,22 @@ void TransferValue(Archive& archive, SeenPoints& points) {
 
 template <class Archive>
 void TransferValue(Archive& archive, ReadoutEstimate& readout) {
-  auto& [readout_s, readout_from, sigma_s, gain_sigmas, shear_px, noise_px, frame_s] = readout;
-  archive(readout_s, readout_from, sigma_s, gain_sigmas, shear_px, noise_px, frame_s);
+  auto& [readout_s,
+         readout_from,
+         sigma_s,
+         gain_sigmas,
+         least_gain_sigmas,
+         shear_px,
+         noise_px,
+         frame_s] = readout;
+  archive(readout_s,
+          readout_from,
+          sigma_s,
+          gain_sigmas,
+          least_gain_sigmas,
+          shear_px,
+          noise_px,
+          frame_s);
 }
 
 /// The result of AddFrame for one frame, from which the frame can be replayed without its image.

@@ -98,7 +98,7 @@ LoopClosure::LoopClosure(const Camera& camera,
       unconfirmed_(options.verification) {}
 
 LoopReport LoopClosure::AddFrame(const FrameEstimate& estimate,
-                                 const cv::Mat& image,
+                                 const MaskedImage& image,
                                  const RotationMap& cam_from_world,
                                  const DisjointSets& pieces) {
   timestamps_s_[estimate.frame] = estimate.timestamp_s;
@@ -201,12 +201,12 @@ bool LoopClosure::IsNewPlace(const FrameEstimate& estimate) const {
 }
 
 LoopClosure::PendingPlace LoopClosure::Describe(const FrameEstimate& estimate,
-                                                const cv::Mat& image) {
+                                                const MaskedImage& image) {
   const Stopwatch stopwatch(seconds_.description);
   PendingPlace pending;
   Place& place = pending.place;
   place.corners.frame = estimate.frame;
-  const ImagePyramid pyramid = BuildPyramid(ToGrey(image), feature_options_);
+  const ImagePyramid pyramid = BuildPyramid(ToGrey(image.image), feature_options_, image.mask);
   DetectFeatures(pyramid, camera_, feature_options_, tools_.num_threads, place.corners);
   DescribeFeatures(pyramid, tools_.num_threads, place.corners);
   place.corners.rgb = {};

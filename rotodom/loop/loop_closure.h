@@ -100,7 +100,7 @@ class LoopClosure {
   /// @param cam_from_world  present orientations of all frames so far.
   /// @param pieces          connected components of the view-graph, by frame.
   LoopReport AddFrame(const FrameEstimate& estimate,
-                      const cv::Mat& image,
+                      const MaskedImage& image,
                       const RotationMap& cam_from_world,
                       const DisjointSets& pieces);
 
@@ -141,7 +141,7 @@ class LoopClosure {
   };
 
   bool IsNewPlace(const FrameEstimate& estimate) const;
-  PendingPlace Describe(const FrameEstimate& estimate, const cv::Mat& image);
+  PendingPlace Describe(const FrameEstimate& estimate, const MaskedImage& image);
   // The pending place after the rotation that follows it is known; nullopt where there is none or
   // its corners are not known accurately enough.
   std::optional<Place> TakePending(const RotationMap& cam_from_world);

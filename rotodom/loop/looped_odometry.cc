@@ -43,7 +43,7 @@ LoopedOdometry::LoopedOdometry(const Camera& camera, const LoopedOdometryOptions
 
 LoopedEstimate LoopedOdometry::AddFrame(FrameId frame,
                                         double timestamp_s,
-                                        const cv::Mat& image,
+                                        const MaskedImage& image,
                                         FrameRecord* record) {
   FrameEstimate estimate = odometry_.AddFrame(frame, timestamp_s, image);
   if (record != nullptr) *record = {estimate, std::nullopt, {}};

@@ -52,7 +52,7 @@ class LoopedOdometry {
   /// @param record  when set, receives the input of Replay.
   LoopedEstimate AddFrame(FrameId frame,
                           double timestamp_s,
-                          const cv::Mat& image,
+                          const MaskedImage& image,
                           FrameRecord* record = nullptr);
 
   /// Restores the state of another object that was constructed with the same arguments (the number

@@ -147,7 +147,8 @@ class Verifier {
                                             covariance_px(old_place, of_old),
                                             view_.bearings[of_view],
                                             covariance_px(view_, of_view),
-                                            R_view_old),
+                                            R_view_old,
+                                            TangentBasis(view_.bearings[of_view])),
                        0.0});
     }
     return noise;

@@ -1,19 +1,15 @@
 #pragma once
 
-#include <array>
 #include <optional>
 
 #include <Eigen/Core>
 #include <opencv2/core.hpp>
 
 #include "rotodom/camera/camera.h"
+#include "rotodom/matching/patch_loops.h"
 #include "rotodom/types/rotation.h"
 
 namespace rotslam {
-
-/// Side of a patch in pixels. At 11 nearly all corners have structure in both directions. Smaller
-/// patches lose more accuracy than they save time, larger ones cross depth edges.
-inline constexpr int kPatchSide = 11;
 
 /// The grey values around a keypoint, prepared for alignment.
 ///
@@ -32,13 +28,7 @@ class PatchTemplate {
  private:
   friend struct PatchAligner;
 
-  // Rows are padded to whole vector registers; what is beyond kPatchSide is zero.
-  static constexpr int kStride = 12;
-  using Plane = std::array<float, static_cast<std::size_t>(kPatchSide) * kStride>;
-
-  alignas(16) Plane values_;  // mean removed
-  alignas(16) Plane gradient_x_;
-  alignas(16) Plane gradient_y_;
+  PatchPlanes planes_;
   float energy_ = 0.0F;      // sum of squared values
   float noise_left_ = 1.0F;  // variance of the sampled values by that of the image noise
   Eigen::Matrix2f inverse_hessian_;

@@ -31,9 +31,11 @@ struct WhitenedErrors {
 Eigen::Matrix2d CovarianceOfDifference(const Eigen::Vector3d& bearing_i,
                                        const Eigen::Vector3d& bearing_j,
                                        const Eigen::Matrix3d& R_j_i,
+                                       const Eigen::Matrix<double, 3, 2>& basis_j,
                                        const KeypointCovariances& covariances) {
   const Eigen::Matrix2d floor = kSmallestSigmaPx * kSmallestSigmaPx * Eigen::Matrix2d::Identity();
-  return DifferenceCovariance(bearing_i, covariances.i_px, bearing_j, covariances.j_px, R_j_i) +
+  return DifferenceCovariance(
+             bearing_i, covariances.i_px, bearing_j, covariances.j_px, R_j_i, basis_j) +
          floor;
 }
 
@@ -49,21 +51,21 @@ class Whitening {
   WhitenedErrors operator()(const Eigen::Vector3d& bearing_i,
                             const Eigen::Vector3d& bearing_j,
                             const KeypointCovariances* covariances) const {
-    const Eigen::Matrix<double, 3, 2> basis = TangentBasis(bearing_j);
+    // Across the epipolar line and along it.
+    Eigen::Matrix<double, 3, 2> basis;
+    basis.col(0) = direction_.cross(bearing_j).normalized();
+    basis.col(1) = bearing_j.cross(basis.col(0));
     const Eigen::Matrix2d C =
         squared_pixel_ *
         (covariances == nullptr
              ? Eigen::Matrix2d(2.0 * Eigen::Matrix2d::Identity())
-             : CovarianceOfDifference(bearing_i, bearing_j, rotation_, *covariances));
-    const Eigen::Vector2d across = (basis.transpose() * direction_.cross(bearing_j)).normalized();
-    const Eigen::Vector2d along(-across.y(), across.x());
+             : CovarianceOfDifference(bearing_i, bearing_j, rotation_, basis, *covariances));
     const Eigen::Vector2d of_rotation = basis.transpose() * (rotation_ * bearing_i - bearing_j);
-    const Eigen::Vector2d of_epipolar = basis.transpose() * (epipolar_ * bearing_i - bearing_j);
-    const double distance = across.dot(of_epipolar);
+    const double distance = basis.col(0).dot(epipolar_ * bearing_i - bearing_j);
     const Eigen::Matrix2d information = C.inverse();
     return {of_rotation.dot(information * of_rotation),
-            distance * distance / across.dot(C * across),
-            squared_shared_ * along.dot(information * along)};
+            distance * distance / C(0, 0),
+            squared_shared_ * information(1, 1)};
   }
 
  private:

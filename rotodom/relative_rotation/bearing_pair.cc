@@ -24,11 +24,16 @@ Eigen::Matrix2d DifferenceCovariance(const Eigen::Vector3d& bearing_i,
                                      const Eigen::Matrix2d& image_covariance_i,
                                      const Eigen::Vector3d& bearing_j,
                                      const Eigen::Matrix2d& image_covariance_j,
-                                     const Eigen::Matrix3d& R_j_i) {
-  const Eigen::Matrix2d carried =
-      TangentBasis(bearing_j).transpose() * R_j_i * TangentBasis(bearing_i);
-  return carried * TangentCovariance(bearing_i, image_covariance_i) * carried.transpose() +
-         TangentCovariance(bearing_j, image_covariance_j);
+                                     const Eigen::Matrix3d& R_j_i,
+                                     const Eigen::Matrix<double, 3, 2>& basis_j) {
+  // d bearing = z (I - f f^T) (dx, dy, 0); the basis is perpendicular to f_j.
+  Eigen::Matrix<double, 3, 2> d_bearing_i = -bearing_i * bearing_i.head<2>().transpose();
+  d_bearing_i(0, 0) += 1.0;
+  d_bearing_i(1, 1) += 1.0;
+  const Eigen::Matrix2d J_i =
+      bearing_i.z() * (basis_j.transpose() * R_j_i).lazyProduct(d_bearing_i);
+  const Eigen::Matrix2d J_j = bearing_j.z() * basis_j.transpose().leftCols<2>();
+  return J_i * image_covariance_i * J_i.transpose() + J_j * image_covariance_j * J_j.transpose();
 }
 
 }  // namespace rotslam

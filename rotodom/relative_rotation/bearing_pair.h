@@ -40,10 +40,13 @@ Eigen::Matrix2d TangentCovariance(const Eigen::Vector3d& bearing,
 /// Covariance of the difference of R f_i and f_j, bearings of one point in two images: for
 /// MatchNoise::covariance_j, with variance_i = 0.
 /// @param image_covariance_i, image_covariance_j  covariances of its two image positions.
+/// @param basis_j  two orthonormal vectors perpendicular to bearing_j, as columns; those of
+///                 TangentBasis for a MatchNoise.
 Eigen::Matrix2d DifferenceCovariance(const Eigen::Vector3d& bearing_i,
                                      const Eigen::Matrix2d& image_covariance_i,
                                      const Eigen::Vector3d& bearing_j,
                                      const Eigen::Matrix2d& image_covariance_j,
-                                     const Eigen::Matrix3d& R_j_i);
+                                     const Eigen::Matrix3d& R_j_i,
+                                     const Eigen::Matrix<double, 3, 2>& basis_j);
 
 }  // namespace rotslam

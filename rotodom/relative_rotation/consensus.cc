@@ -7,6 +7,7 @@
 #include <numbers>
 #include <optional>
 #include <random>
+#include <utility>
 #include <vector>
 
 #include <Eigen/Dense>
@@ -110,59 +111,6 @@ double Quantile(std::vector<double> values, double part) {
   return *at;
 }
 
-// Bounds of the distances that a score counts, rad.
-struct ScoreBounds {
-  // Standard deviation of the distances. Flow of that size may have any direction; otherwise a
-  // model would be preferred that explains rotation by translation, so that all flow has one
-  // direction.
-  double noise = 0.0;
-  double threshold = 0.0;  // of an inlier
-  double finest = 0.0;     // below this all distances are alike
-};
-
-// ScoreEpipolar with the distances to the epipolar half-lines, which hold the points in front of
-// both cameras, for the sign of the direction that fits better. A plane has two motions that fit
-// all its epipolar lines, but with the wrong one about half of it is behind the cameras.
-HypothesisScore ScoreHalfLines(const PairArrays& pairs,
-                               const EpipolarModel& model,
-                               const std::vector<double>& squared_distances,
-                               const ScoreBounds& bounds) {
-  const auto& [noise, threshold, finest] = bounds;
-  // Distances contain the noise of both views, so flows are divided by the root of two below.
-  constexpr double kSigmas = 2.0;
-  const double any_way = kSigmas * noise;
-  const std::vector<double> squared_flows = SquaredFlows(pairs, model.j_from_i);
-  const Eigen::Matrix3d R_j_i = model.j_from_i.Matrix();
-  const double squared_threshold = threshold * threshold;
-  const double inverse_squared_finest = 1.0 / (finest * finest);
-  const double outlier = 1.0 + squared_threshold * inverse_squared_finest;
-  // One logarithm per block of factors. No factor exceeds `outlier`, and the block is small enough
-  // for the product not to overflow.
-  constexpr double kLargestLog = 600.0;
-  const int block = std::max(1, static_cast<int>(kLargestLog / std::log(outlier)));
-  std::array<HypothesisScore, 2> scores;  // of the direction and of its opposite
-  std::array<double, 2> products = {1.0, 1.0};
-  for (int k = 0; k < pairs.size(); ++k) {
-    const Eigen::Vector3d g = R_j_i * pairs.BearingI(k);
-    const bool is_ahead = g.cross(pairs.BearingJ(k)).dot(g.cross(model.direction)) > 0.0;
-    // The half-line ends at the point at infinity.
-    const double beyond_end = std::max(0.0, std::sqrt(0.5 * squared_flows[k]) - any_way);
-    const double squared_behind = std::max(squared_distances[k], beyond_end * beyond_end);
-    for (int sign = 0; sign < 2; ++sign) {
-      const double squared = is_ahead == (sign == 0) ? squared_distances[k] : squared_behind;
-      const bool is_inlier = squared < squared_threshold;
-      products[sign] *= is_inlier ? 1.0 + squared * inverse_squared_finest : outlier;
-      scores[sign].num_inliers += is_inlier;
-    }
-    if (k % block != block - 1 && k != pairs.size() - 1) continue;
-    for (int sign = 0; sign < 2; ++sign) {
-      scores[sign].score += std::log(products[sign]);
-      products[sign] = 1.0;
-    }
-  }
-  return scores[0].score <= scores[1].score ? scores[0] : scores[1];
-}
-
 class Search {
  public:
   Search(const PairArrays& pairs, double focal_px, const RelativeRotationOptions& options)
@@ -171,7 +119,7 @@ class Search {
         options_(options),
         threshold_(options.inlier_px / focal_px),
         smallest_noise_(kMinNoisePx / focal_px),
-        finest_(kFinestPx / focal_px) {}
+        bounds_{threshold_, kFinestPx / focal_px} {}
 
   const Consensus& best() const { return best_; }
 
@@ -196,6 +144,11 @@ class Search {
     FocusOn(rotation);
     const Eigen::Matrix3d axes = TranslationAxes(thinned_, rotation);
     for (int k = 0; k < 3; ++k) DescendAndConsider({rotation, axes.col(k)});
+  }
+
+  void DescendFromModel(const EpipolarModel& model) {
+    FocusOn(model.j_from_i);
+    DescendAndConsider(model);
   }
 
   void DescendFromAligned(const Rotation& start) {
@@ -256,9 +209,7 @@ class Search {
   // Accepts the model if its score is better than the best so far.
   bool Consider(const EpipolarModel& model) {
     // The score of the lines is cheap and a lower bound of that of the half-lines.
-    if (!(ScoreEpipolar(pairs_, model, threshold_, finest_, best_score_).score < best_score_)) {
-      return false;
-    }
+    if (!(ScoreEpipolar(pairs_, model, bounds_, best_score_).score < best_score_)) return false;
     const HypothesisScore score = ScoreOf(model);
     if (!(score.score < best_score_)) return false;
     best_score_ = score.score;
@@ -268,9 +219,12 @@ class Search {
   }
 
   HypothesisScore ScoreOf(const EpipolarModel& model) const {
-    const std::vector<double> squared_distances = SquaredDistances(pairs_, model);
+    // Flow of the size of the noise may have any direction; otherwise a model would be preferred
+    // that explains rotation by translation, so that all flow has one direction.
+    constexpr double kSigmas = 2.0;
+    std::vector<double> squared_distances = SquaredDistances(pairs_, model);
     const double noise = NoiseOf(squared_distances, threshold_, smallest_noise_);
-    return ScoreHalfLines(pairs_, model, squared_distances, {noise, threshold_, finest_});
+    return ScoreHalfLines(pairs_, model, std::move(squared_distances), bounds_, kSigmas * noise);
   }
 
   // The 30th percentile of the lengths of the flow, rad.
@@ -350,7 +304,7 @@ class Search {
   const RelativeRotationOptions& options_;
   const double threshold_;
   const double smallest_noise_;
-  const double finest_;
+  const ScoreBounds bounds_;
 
   std::vector<int> near_;              // indices from FocusOn
   std::vector<int> agreeing_;          // indices from FocusOnBest
@@ -416,6 +370,20 @@ std::vector<Consensus> FindConsensus(const PairArrays& pairs,
     consensus.members = RejectChanceInliers(pairs, consensus.model, options.inlier_px / focal_px);
   }
   return found;
+}
+
+Consensus FollowConsensus(const PairArrays& pairs,
+                          const EpipolarModel& known,
+                          const Rotation& predicted_j_from_i,
+                          double focal_px,
+                          const RelativeRotationOptions& options) {
+  Search search(pairs, focal_px, options);
+  search.DescendFrom(predicted_j_from_i);
+  if (!known.direction.isZero()) search.DescendFromModel(known);
+  search.DescendFromAmbiguity();
+  Consensus followed = search.best();
+  followed.members = RejectChanceInliers(pairs, followed.model, options.inlier_px / focal_px);
+  return followed;
 }
 
 }  // namespace rotslam

@@ -48,4 +48,13 @@ std::vector<Consensus> FindConsensus(const PairArrays& pairs,
                                      const RelativeRotationOptions& options,
                                      std::uint64_t seed);
 
+/// Follows a known minimum after the pairs have changed a little: descents from `known` and from
+/// the prediction instead of the search above.
+/// @param known  its direction may be zero.
+Consensus FollowConsensus(const PairArrays& pairs,
+                          const EpipolarModel& known,
+                          const Rotation& predicted_j_from_i,
+                          double focal_px,
+                          const RelativeRotationOptions& options);
+
 }  // namespace rotslam

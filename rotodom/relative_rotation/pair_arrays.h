@@ -6,6 +6,7 @@
 #include <Eigen/Core>
 
 #include "rotodom/relative_rotation/bearing_pair.h"
+#include "rotodom/relative_rotation/pair_loops.h"
 #include "rotodom/types/rotation.h"
 
 namespace rotslam {
@@ -33,23 +34,14 @@ class PairArrays {
   bool weighted() const { return weighted_; }
   /// Length of an array: size() rounded up to a multiple of kLanes; the rest is zero.
   int padded_size() const { return padded_size_; }
-  /// Coordinate `row` of all pairs, see Row.
+  /// Coordinate `row` of all pairs, see PairRows::Row.
   const double* row(int row) const { return data_.data() + std::ptrdiff_t{row} * padded_size_; }
 
   Eigen::Vector3d BearingI(int index) const;
   Eigen::Vector3d BearingJ(int index) const;
 
-  static constexpr int kLanes = 4;
-  enum Row {
-    kBearingI = 0,                    // 3
-    kBearingJ = 3,                    // 3
-    kNominalRows = 6,                 // all there is unless weighted()
-    kCovarianceJ = kNominalRows,      // 6: upper triangle, 3x3, tangential block as given and 1
-                                      // along the bearing, so that a nominal pair has I
-    kVarianceI = kCovarianceJ + 6,    // 1
-    kInformation = kVarianceI + 1,    // 6: upper triangle of the inverse of the mean of both views'
-    kWeightedRows = kInformation + 6  //    covariances
-  };
+  static constexpr int kLanes = PairRows::kLanes;
+  PairRows rows() const { return {data_.data(), padded_size_, size_, weighted_}; }
 
  private:
   void Allocate(int size, bool weighted);
@@ -80,7 +72,13 @@ struct HypothesisScore {
   int num_inliers = 0;  // complete only when the score stayed below the limit
 };
 
-// The loops over all pairs. They use AVX2 where the machine has it.
+/// Bounds of the distances that a score counts, rad.
+struct ScoreBounds {
+  double threshold = 0.0;  // of an inlier
+  double finest = 0.0;     // below this all distances are alike
+};
+
+// The loops over all pairs (PairLoops).
 //
 // The Sampson distance of a pair is r = t . (g x f) / sqrt(D), g = R f_i, f = f_j, where D is the
 // variance of the numerator for nominal noise (Muhle et al., The Probabilistic Normal Epipolar
@@ -91,14 +89,24 @@ EpipolarNormal LinearizeEpipolar(const PairArrays& pairs, const EpipolarModel& m
 
 RotationNormal LinearizeRotation(const PairArrays& pairs, const Rotation& j_from_i, double loss);
 
-/// Sum of log(1 + r^2 / finest^2), truncated at `threshold`. The score rises with the accuracy of a
-/// match at every scale above `finest`, so that two models with the same inliers are ranked by the
-/// noise of the matches, whatever its size. Stops once the sum reaches `limit`.
+/// Sum of log(1 + r^2 / finest^2), truncated at the threshold. The score rises with the accuracy of
+/// a match at every scale above `finest`, so that two models with the same inliers are ranked by
+/// the noise of the matches, whatever its size. Stops once the sum reaches `limit`.
 HypothesisScore ScoreEpipolar(const PairArrays& pairs,
                               const EpipolarModel& model,
-                              double threshold,
-                              double finest,
+                              const ScoreBounds& bounds,
                               double limit);
+
+/// ScoreEpipolar with the distances to the epipolar half-lines, which hold the points in front of
+/// both cameras, for the sign of the direction that fits better. A plane has two motions that fit
+/// all its epipolar lines, but with the wrong one about half of it is behind the cameras.
+/// @param squared_distances  of SquaredDistances, for the same model.
+/// @param any_way            flow up to this length may have any direction, rad.
+HypothesisScore ScoreHalfLines(const PairArrays& pairs,
+                               const EpipolarModel& model,
+                               std::vector<double> squared_distances,
+                               const ScoreBounds& bounds,
+                               double any_way);
 
 /// Squared Sampson distances, size() of them; those of pairs that point in opposite directions are
 /// infinite.
@@ -106,5 +114,8 @@ std::vector<double> SquaredDistances(const PairArrays& pairs, const EpipolarMode
 
 /// Squared lengths of R f_i - f_j, size() of them, each per nominal variance of one view.
 std::vector<double> SquaredFlows(const PairArrays& pairs, const Rotation& j_from_i);
+
+/// How many of the values are smaller than the limit.
+std::ptrdiff_t CountBelow(std::span<const double> values, double limit);
 
 }  // namespace rotslam

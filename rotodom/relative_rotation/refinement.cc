@@ -97,12 +97,7 @@ Eigen::Matrix3d TranslationAxes(const PairArrays& pairs, const Rotation& j_from_
 }
 
 double NoiseOf(const std::vector<double>& squared_distances, double threshold, double smallest) {
-  const auto count_below = [&](double squared_limit) {
-    std::ptrdiff_t count = 0;
-    for (const double squared : squared_distances) count += squared < squared_limit ? 1 : 0;
-    return count;
-  };
-  const std::ptrdiff_t half = count_below(threshold * threshold) / 2;
+  const std::ptrdiff_t half = CountBelow(squared_distances, threshold * threshold) / 2;
   if (half == 0) return threshold;
   // Median by bisection of its logarithm; passes without branches are faster than sorting.
   constexpr double kPrecision = 1.002;
@@ -110,7 +105,7 @@ double NoiseOf(const std::vector<double>& squared_distances, double threshold, d
   double high = threshold;
   while (high > kPrecision * low) {
     const double middle = std::sqrt(low * high);
-    (count_below(middle * middle) > half ? high : low) = middle;
+    (CountBelow(squared_distances, middle * middle) > half ? high : low) = middle;
   }
   return std::max(kSigmasPerMedianDeviation * std::sqrt(low * high), smallest);
 }

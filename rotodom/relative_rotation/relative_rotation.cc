@@ -59,7 +59,10 @@ Eigen::Vector3d WithForwardSign(const PairArrays& pairs,
   return votes >= 0 ? model.direction : Eigen::Vector3d(-model.direction);
 }
 
-void CheckMatches(const MatchedBearings& matches) {
+void CheckInputs(const MatchedBearings& matches, const RelativeRotationOptions& options) {
+  if (const auto problem = options.Problem()) {
+    throw std::invalid_argument("RelativeRotationOptions: " + *problem);
+  }
   if (!matches.covariances.empty() && matches.covariances.size() != matches.pairs.size()) {
     throw std::invalid_argument("EstimateRelativeRotation: not one covariance per pair");
   }
@@ -204,9 +207,7 @@ std::vector<RelativeRotationEstimate> EstimateRotationHypotheses(
     double focal_px,
     const RelativeRotationOptions& options,
     std::uint64_t seed) {
-  if (const auto problem = options.Problem())
-    throw std::invalid_argument("RelativeRotationOptions: " + *problem);
-  CheckMatches(matches);
+  CheckInputs(matches, options);
   if (static_cast<int>(matches.pairs.size()) < options.min_inliers) return {};
 
   const PairArrays all(matches.pairs);
@@ -230,6 +231,19 @@ std::optional<RelativeRotationEstimate> EstimateRelativeRotation(
   auto estimates = EstimateRotationHypotheses(matches, predicted_j_from_i, focal_px, options, seed);
   if (estimates.empty()) return std::nullopt;
   return std::move(estimates.front());
+}
+
+std::optional<RelativeRotationEstimate> UpdateRelativeRotation(
+    const MatchedBearings& matches,
+    const EpipolarModel& known,
+    const Rotation& predicted_j_from_i,
+    double focal_px,
+    const RelativeRotationOptions& options) {
+  CheckInputs(matches, options);
+  if (static_cast<int>(matches.pairs.size()) < options.min_inliers) return std::nullopt;
+  const PairArrays all(matches.pairs);
+  const Consensus consensus = FollowConsensus(all, known, predicted_j_from_i, focal_px, options);
+  return EstimateFrom(all, consensus, focal_px, options, matches.covariances);
 }
 
 }  // namespace rotslam

@@ -7,6 +7,7 @@
 
 #include "rotodom/relative_rotation/baseline_evidence.h"
 #include "rotodom/relative_rotation/bearing_pair.h"
+#include "rotodom/relative_rotation/pair_arrays.h"
 #include "rotodom/relative_rotation/relative_rotation_options.h"
 #include "rotodom/types/rotation.h"
 
@@ -82,5 +83,17 @@ std::vector<RelativeRotationEstimate> EstimateRotationHypotheses(
     double focal_px,
     const RelativeRotationOptions& options,
     std::uint64_t seed);
+
+/// Estimates a rotation again after the bearings have changed by less than the threshold of an
+/// inlier: from the known minimum and the prediction instead of a search.
+/// @param known  the last estimate; its direction may be zero.
+/// @return  as EstimateRelativeRotation, with num_samples and excess zero.
+/// Cost:    half of EstimateRelativeRotation.
+std::optional<RelativeRotationEstimate> UpdateRelativeRotation(
+    const MatchedBearings& matches,
+    const EpipolarModel& known,
+    const Rotation& predicted_j_from_i,
+    double focal_px,
+    const RelativeRotationOptions& options);
 
 }  // namespace rotslam

@@ -1,9 +1,9 @@
 #include "rotodom/rolling_shutter/readout.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <cstddef>
-#include <cstdint>
 #include <limits>
 #include <numeric>
 #include <utility>
@@ -23,6 +23,8 @@ constexpr std::size_t kMinPairs = 10;  // one for each block of the jackknife
 constexpr double kLongestReadout = 0.05;
 // Steps of the first search in each direction.
 constexpr int kCoarseSteps = 12;
+// Pairs of views that decide between the minima; then all of them measure the readout.
+constexpr std::size_t kDecidingPairs = 75;
 // Lower bound of the noise of matches, px.
 constexpr double kLeastNoisePx = 0.05;
 
@@ -95,6 +97,23 @@ double JackknifeSigma(const ScoreTable& table) {
   return std::sqrt(squares * (kBlocks - 1) / kBlocks);
 }
 
+// Gain of a group of pairs.
+struct GroupGain {
+  double sum = 0.0;
+  double squares = 0.0;
+  std::size_t count = 0;
+
+  void Add(double gain) {
+    sum += gain;
+    squares += gain * gain;
+    ++count;
+  }
+  // In standard errors.
+  double Sigmas() const { return squares > 0.0 ? sum / std::sqrt(squares) : 0.0; }
+  // The same, 0 for a group too small to confirm anything.
+  double InGroup() const { return count < kMinPairs ? 0.0 : Sigmas(); }
+};
+
 // Searches the readout that explains the pairs best.
 class ReadoutSearch {
  public:
@@ -104,6 +123,7 @@ class ReadoutSearch {
                 const RelativeRotationOptions& options,
                 int num_threads)
       : pairs_(std::move(pairs)),
+        coarse_stride_(std::max<std::size_t>(1, pairs_.size() / kDecidingPairs)),
         coarse_step_s_(longest_s / kCoarseSteps),
         num_threads_(num_threads) {
     FindModels(focal_px, options);
@@ -115,8 +135,8 @@ class ReadoutSearch {
   struct Minimum {
     ReadoutCandidate at;
     ScoreTable around;
-
     double lowest = 0.0;  // sum of the criteria
+    double step_s = 0.0;  // of the table
   };
 
   /// nullopt where the only minima are at the ends.
@@ -135,21 +155,40 @@ class ReadoutSearch {
       Minimum minimum = Refine(std::move(candidate));
       if (!best || minimum.lowest < best->lowest) best = std::move(minimum);
     }
+    if (!best) return std::nullopt;
+    // All pairs may have their minimum outside of a table around that of some.
+    constexpr int kMaxTables = 3;
+    for (int table = 0; table < kMaxTables; ++table) {
+      Tabulate(best->step_s, kFinalSteps, 1, *best);
+      if (!best->around.IsAtAnEnd(best->around.Lowest(0, 0))) break;
+    }
+    best->at.readout.seconds = best->around.Lowest(0, 0);
     return best;
   }
 
   /// Gain of a candidate over a global shutter, in standard errors.
-  double GainSigmas(ReadoutCandidate candidate) const {
+  struct Gain {
+    double of_all = 0.0;
+    double of_worst_group = 0.0;  // 0 where a group has too few pairs
+  };
+  Gain GainSigmas(ReadoutCandidate candidate) const {
     ReadoutCandidate global = global_;
-    const std::vector<double> without = Score(global, noise_);
+    std::vector<double> gains = Score(global, noise_);
     const std::vector<double> with = Score(candidate, noise_);
-    double gain = 0.0;
-    double squares = 0.0;
-    for (std::size_t k = 0; k < pairs_.size(); ++k) {
-      gain += without[k] - with[k];
-      squares += (without[k] - with[k]) * (without[k] - with[k]);
+    for (std::size_t k = 0; k < gains.size(); ++k) gains[k] -= with[k];
+    GroupGain all;
+    std::array<GroupGain, 2> halves;
+    std::array<GroupGain, 2> changes;
+    for (std::size_t k = 0; k < gains.size(); ++k) {
+      all.Add(gains[k]);
+      halves[2 * k < gains.size() ? 0 : 1].Add(gains[k]);
+      changes[pairs_[k].RotatesFaster() ? 0 : 1].Add(gains[k]);
     }
-    return squares > 0.0 ? gain / std::sqrt(squares) : 0.0;
+    return {all.Sigmas(),
+            std::min({halves[0].InGroup(),
+                      halves[1].InGroup(),
+                      changes[0].InGroup(),
+                      changes[1].InGroup()})};
   }
 
   double noise() const { return noise_; }                      // of bearings, rad
@@ -161,11 +200,10 @@ class ReadoutSearch {
     global_.models.resize(pairs_.size());
     std::vector<double> noises_px(pairs_.size(), options.inlier_px);
     ParallelFor(static_cast<int>(pairs_.size()), num_threads_, [&](int k) {
-      constexpr std::uint64_t kSeed = 1;
       const Rotation& predicted = pairs_[k].predicted_j_from_i;
       const std::vector<BearingPair> bearings = pairs_[k].BearingsFor({});
-      const auto estimate =
-          EstimateRelativeRotation({bearings}, predicted, focal_px, options, kSeed);
+      const auto estimate = UpdateRelativeRotation(
+          {bearings}, {predicted, pairs_[k].translation_direction}, predicted, focal_px, options);
       auto& [rotation, epipolar] = global_.models[k];
       rotation = epipolar.j_from_i = estimate ? estimate->j_from_i : predicted;
       if (estimate) noises_px[k] = estimate->noise_px;
@@ -177,19 +215,22 @@ class ReadoutSearch {
     noise_ = std::max(Median(std::move(noises_px)), kLeastNoisePx) / focal_px;
   }
 
-  // Computes the criterion of each pair and refines the candidate's models.
-  std::vector<double> Score(ReadoutCandidate& candidate, double noise) const {
+  // Computes the criterion of every `stride`th pair and refines the candidate's models of these.
+  std::vector<double> Score(ReadoutCandidate& candidate,
+                            double noise,
+                            std::size_t stride = 1) const {
     constexpr double kLossSigmas = 3.0;
     constexpr int kIterations = 10;
     constexpr double kTolerance = 1e-4;
-    std::vector<double> scores(pairs_.size());
-    ParallelFor(static_cast<int>(pairs_.size()), num_threads_, [&](int k) {
+    std::vector<double> scores((pairs_.size() + stride - 1) / stride);
+    ParallelFor(static_cast<int>(scores.size()), num_threads_, [&](int n) {
+      const std::size_t k = static_cast<std::size_t>(n) * stride;
       const PairArrays bearings(pairs_[k].BearingsFor(candidate.readout));
       auto& [rotation, epipolar] = candidate.models[k];
       const double loss = kLossSigmas * noise;
       rotation = RefineRotation(bearings, rotation, loss, kIterations).j_from_i;
       epipolar = RefineEpipolar(bearings, epipolar, loss, kIterations, kTolerance).model;
-      scores[k] = std::min(RotationCriterion(SquaredFlows(bearings, rotation), noise),
+      scores[n] = std::min(RotationCriterion(SquaredFlows(bearings, rotation), noise),
                            EpipolarCriterion(SquaredDistances(bearings, epipolar), noise));
     });
     return scores;
@@ -208,7 +249,7 @@ class ReadoutSearch {
     std::vector<double> sums(line.size());
     const auto visit = [&](int step, ReadoutCandidate candidate) {
       candidate.readout = {axis, step * coarse_step_s_};
-      sums[kCoarseSteps + step] = Sum(Score(candidate, NoiseFor(coarse_step_s_)));
+      sums[kCoarseSteps + step] = Sum(Score(candidate, NoiseFor(coarse_step_s_), coarse_stride_));
       line[kCoarseSteps + step] = std::move(candidate);
     };
     visit(0, global_);
@@ -221,30 +262,40 @@ class ReadoutSearch {
     }
   }
 
+  // Narrows the steps around a minimum as far as the noise allows.
   Minimum Refine(ReadoutCandidate candidate) const {
     Minimum minimum{std::move(candidate), {}, 0.0};
     bool is_last = false;
     for (double step_s = 0.5 * coarse_step_s_; !is_last; step_s *= 0.5) {
       is_last = NoiseFor(step_s) == noise_;
-      const int num_around = is_last ? 6 : 3;
-      const ReadoutCandidate middle = minimum.at;
-      minimum.around = {middle.readout.seconds - num_around * step_s, step_s, {}};
-      minimum.lowest = std::numeric_limits<double>::infinity();
-      for (int k = -num_around; k <= num_around; ++k) {
-        ReadoutCandidate at = middle;
-        at.readout.seconds += k * step_s;
-        minimum.around.scores.push_back(Score(at, NoiseFor(step_s)));
-        const double sum = Sum(minimum.around.scores.back());
-        if (sum >= minimum.lowest) continue;
-        minimum.lowest = sum;
-        minimum.at = std::move(at);
-      }
+      Tabulate(step_s, 3, coarse_stride_, minimum);
+      minimum.step_s = step_s;
     }
-    minimum.at.readout.seconds = minimum.around.Lowest(0, 0);
     return minimum;
   }
 
+  // Moves to the best of the readouts around a minimum.
+  void Tabulate(double step_s, int num_around, std::size_t stride, Minimum& minimum) const {
+    const ReadoutCandidate middle = minimum.at;
+    minimum.around = {middle.readout.seconds - num_around * step_s, step_s, {}};
+    minimum.lowest = std::numeric_limits<double>::infinity();
+    for (int k = -num_around; k <= num_around; ++k) {
+      ReadoutCandidate at = middle;
+      at.readout.seconds += k * step_s;
+      minimum.around.scores.push_back(Score(at, NoiseFor(step_s), stride));
+      const double sum = Sum(minimum.around.scores.back());
+      if (sum >= minimum.lowest) continue;
+      minimum.lowest = sum;
+      minimum.at = std::move(at);
+    }
+  }
+
+  // Steps around the minimum of the last table, which the jackknife needs to contain those of parts
+  // of the pairs.
+  static constexpr int kFinalSteps = 6;
+
   std::vector<ViewPair> pairs_;  // in order of time
+  std::size_t coarse_stride_;    // one of so many pairs decides
   double coarse_step_s_;
   int num_threads_;
   ReadoutCandidate global_;
@@ -256,14 +307,22 @@ class ReadoutSearch {
 
 bool ReadoutEstimate::IsRolling() const {
   // Thresholds: the fastest rolling shutter, s; standard deviations of the readout, of which
-  // sequences with a global shutter reach up to 4.3; and of the gain.
+  // sequences with a global shutter reach up to 4.3; of the gain, and of the worst group's.
   constexpr double kShortest = 1e-3;
   constexpr double kSigmas = 5.0;
   constexpr double kGainSigmas = 2.0;
+  constexpr double kLeastGainSigmas = 1.5;
+  // Sensors are read from the top. From a side it is the picture of a camera held upright, which is
+  // rare, while errors of the lens and parallax are mostly horizontal.
+  const bool is_from_a_side =
+      readout_from == ReadoutStart::kLeft || readout_from == ReadoutStart::kRight;
+  const double caution = is_from_a_side ? 2.0 : 1.0;
   // Smallest shear, as a multiple of the noise. A smaller one may be caused by the lens
-  // calibration, and has no effect on the results.
-  constexpr double kLeastShear = 2.5;
-  return readout_s > std::max(kShortest, kSigmas * sigma_s) && gain_sigmas > kGainSigmas &&
+  // calibration, which has reached 5.2, and has little effect on the results; rolling shutters of
+  // cameras in a hand reach 7.5 to 80.
+  constexpr double kLeastShear = 6.5;
+  return readout_s > std::max(kShortest, caution * kSigmas * sigma_s) &&
+         gain_sigmas > caution * kGainSigmas && least_gain_sigmas > caution * kLeastGainSigmas &&
          shear_px > kLeastShear * noise_px;
 }
 
@@ -291,7 +350,9 @@ std::optional<ReadoutEstimate> EstimateReadout(const Camera& camera,
   estimate.readout_s = std::abs(best->at.readout.seconds);
   estimate.readout_from = StartOf(best->at.readout);
   estimate.sigma_s = JackknifeSigma(best->around);
-  estimate.gain_sigmas = search.GainSigmas(best->at);
+  const ReadoutSearch::Gain gain = search.GainSigmas(best->at);
+  estimate.gain_sigmas = gain.of_all;
+  estimate.least_gain_sigmas = gain.of_worst_group;
   estimate.shear_px = estimate.readout_s * search.rate_difference() * focal_px;
   estimate.noise_px = search.noise() * focal_px;
   estimate.frame_s = period_s;

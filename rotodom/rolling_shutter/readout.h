@@ -19,6 +19,9 @@ struct ReadoutEstimate {
   // Improvement over a global shutter in explaining pairs of views: mean gain over its standard
   // error.
   double gain_sigmas = 0.0;
+  // The same of the group of pairs that it improves least. The groups are the two halves in time,
+  // and the pairs between which the rotation becomes faster or slower.
+  double least_gain_sigmas = 0.0;
   double shear_px = 0.0;  // median over the pairs: shear of one view relative to the other
   double noise_px = 0.0;  // standard deviation of their matches
   double frame_s = 0.0;   // time between two frames
@@ -43,10 +46,13 @@ struct TrackedFrames {
 /// With a rolling shutter, two frames at different rotation rates are sheared relative to each
 /// other along rows or columns. Pairs of views are therefore explained, by a rotation or by
 /// rotation and translation, with their points moved to mid-frame for readouts of all lengths and
-/// all four directions; the readout with the best sum of information criteria is the estimate. A
-/// shear alone looks like a baseline, which is why many pairs are needed: they agree on one
-/// readout, and in a pure rotation all baselines vanish with it. Points are moved to mid-frame by
-/// the orientations and by the remaining flow, which is parallax and errors of the orientations.
+/// all four directions; the readout with the best sum of information criteria is the estimate. An
+/// error of the lens deforms pairs by their rotation, whether it becomes faster or slower; a
+/// readout deforms them by the change of the rate, one way where it grows and the other way where
+/// it falls, and in all of the sequence. Therefore each of these groups of pairs has to confirm the
+/// estimate. A shear alone looks like a baseline, which is why many pairs are needed: they agree on
+/// one readout, and in a pure rotation all baselines vanish with it. Points are moved to mid-frame
+/// by the orientations and by the remaining flow, which is parallax and errors of the orientations.
 /// With orientations alone the readout of a hand-held camera comes out too short, because the scene
 /// moves against the rotation.
 /// @return  nullopt where pairs are too few, rotate too evenly or do not agree on a readout below

@@ -122,6 +122,7 @@ class PairMaker {
     pair.motion_i = motions_.at(edge.i).motion;
     pair.motion_j = motions_.at(edge.j).motion;
     pair.predicted_j_from_i = edge.j_from_i;
+    pair.translation_direction = edge.translation_direction;
     pair.rate_difference = RateDifference(edge, motions_);
     const std::vector<TrackId> common = CommonTracks(edge);
     for (const TrackId track : common) {
@@ -183,6 +184,12 @@ class PairMaker {
 };
 
 }  // namespace
+
+bool ViewPair::RotatesFaster() const {
+  const Eigen::Vector3d rate_i = motion_i.coefficients.col(0);
+  const Eigen::Vector3d rate_j = motion_j.coefficients.col(0);
+  return predicted_j_from_i.Log().dot(rate_j - predicted_j_from_i * rate_i) > 0.0;
+}
 
 std::vector<BearingPair> ViewPair::BearingsFor(const Readout& readout) const {
   std::vector<BearingPair> bearings;

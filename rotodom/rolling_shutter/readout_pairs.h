@@ -44,8 +44,14 @@ struct ViewPair {
   AngularMotion motion_j;
   std::vector<SeenPoint> in_i;
   std::vector<SeenPoint> in_j;
+  // The edge's.
   Rotation predicted_j_from_i;
+  Eigen::Vector3d translation_direction;
   double rate_difference = 0.0;  // rad/s: shear per second of readout
+
+  /// Whether the camera rotates faster in view j than in view i, in the direction of the rotation
+  /// between them.
+  bool RotatesFaster() const;
 
   /// Bearings of the points moved to mid-frame, for a camera with that readout.
   std::vector<BearingPair> BearingsFor(const Readout& readout) const;

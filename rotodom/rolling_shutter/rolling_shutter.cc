@@ -8,6 +8,7 @@
 
 #include <Eigen/LU>
 
+#include "rotodom/types/parallel.h"
 #include "rotodom/types/rotation.h"
 
 namespace rotslam {
@@ -111,7 +112,7 @@ Eigen::Vector3d BearingInMidFrame(const AngularMotion& motion, std::span<const T
     for (const TimedBearing& other : seen) {
       if (&other != &one) weight *= other.after_s / (other.after_s - one.after_s);
     }
-    sum += weight * (motion.After(one.after_s).Inverse() * one.bearing);
+    sum += weight * motion.ToMidFrame(one.after_s, one.bearing);
   }
   return sum.normalized();
 }
@@ -119,30 +120,39 @@ Eigen::Vector3d BearingInMidFrame(const AngularMotion& motion, std::span<const T
 void CorrectRollingShutter(const Camera& camera,
                            const AngularMotion& motion,
                            std::span<const View* const> others,
+                           int num_threads,
                            View& view) {
   // Observations closer in time differ by noise rather than by motion.
   const double least_distance_s = 0.5 * camera.readout_s;
-  std::vector<TimedBearing> seen;
-  const auto add = [&](const View& from, int index) {
+  const auto add = [&](const View& from, int index, std::vector<TimedBearing>& seen) {
     const Eigen::Vector2d& keypoint_px = from.features.keypoints_px[index];
-    const auto bearing = camera.Unproject(keypoint_px);
     const double after_s = from.timestamp_s - view.timestamp_s + camera.ExposureTime(keypoint_px);
     const bool is_apart = std::all_of(seen.begin(), seen.end(), [&](const TimedBearing& other) {
       return std::abs(after_s - other.after_s) > least_distance_s;
     });
-    if (bearing && is_apart) seen.push_back({after_s, *bearing});
-  };
-  Features& features = view.features;
-  for (int n = 0; n < features.size(); ++n) {
-    seen.clear();
-    add(view, n);
-    if (seen.empty()) continue;
-    for (const View* other : others) {
-      const int index = FindTrack(other->features, features.tracks[n]);
-      if (index >= 0) add(*other, index);
+    if (!is_apart) return;
+    if (!from.seen_bearings.empty()) {
+      seen.push_back({after_s, from.seen_bearings[index]});
+    } else if (const auto bearing = camera.Unproject(keypoint_px)) {
+      seen.push_back({after_s, *bearing});
     }
-    features.bearings[n] = BearingInMidFrame(motion, seen);
-  }
+  };
+  constexpr int kChunk = 256;
+  Features& features = view.features;
+  const int size = features.size();
+  ParallelFor((size + kChunk - 1) / kChunk, num_threads, [&](int chunk) {
+    std::vector<TimedBearing> seen;
+    for (int n = chunk * kChunk; n < std::min((chunk + 1) * kChunk, size); ++n) {
+      seen.clear();
+      add(view, n, seen);
+      if (seen.empty()) continue;
+      for (const View* other : others) {
+        const int index = FindTrack(other->features, features.tracks[n]);
+        if (index >= 0) add(*other, index, seen);
+      }
+      features.bearings[n] = BearingInMidFrame(motion, seen);
+    }
+  });
 }
 
 void MoveToMidFrame(const Camera& camera, const AngularMotion& motion, Features& corners) {

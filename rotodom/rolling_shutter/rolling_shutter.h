@@ -95,6 +95,7 @@ Eigen::Vector3d BearingInMidFrame(const AngularMotion& motion, std::span<const T
 void CorrectRollingShutter(const Camera& camera,
                            const AngularMotion& motion,
                            std::span<const View* const> others,
+                           int num_threads,
                            View& view);
 
 /// Moves corners (keypoints and bearings) to their positions in a global-shutter image taken at

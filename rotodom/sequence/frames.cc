@@ -1,6 +1,8 @@
 #include "rotodom/sequence/frames.h"
 
+#include <algorithm>
 #include <cmath>
+#include <cstdlib>
 #include <iomanip>
 #include <sstream>
 #include <stdexcept>
@@ -66,6 +68,20 @@ Camera MatchToImages(const Camera& camera, const cv::Size& image_size) {
   if (camera.width == 0 && camera.height == 0) {
     matched.width = image_size.width;
     matched.height = image_size.height;
+  }
+  const double scale = static_cast<double>(image_size.width) / matched.width;
+  // Sizes that nearly agree are of other pictures, cut or undistorted otherwise.
+  constexpr int kNearly_px = 8;
+  if (std::abs(matched.width - image_size.width) > kNearly_px &&
+      std::abs(scale * matched.height - image_size.height) <= std::max(1.0, scale)) {
+    matched.width = image_size.width;
+    matched.height = image_size.height;
+    matched.fx *= scale;
+    matched.fy *= scale;
+    // Centres of pixels are whole numbers.
+    matched.cx = scale * (matched.cx + 0.5) - 0.5;
+    matched.cy = scale * (matched.cy + 0.5) - 0.5;
+    return matched;
   }
   if (matched.width != image_size.width || matched.height != image_size.height) {
     const bool is_turned = camera.width == image_size.height && camera.height == image_size.width;

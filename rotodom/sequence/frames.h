@@ -142,8 +142,9 @@ class Sequence {
   std::optional<std::filesystem::path> ground_truth_file_;
 };
 
-/// `camera` with the size of the images, where it did not say one itself. Throws std::runtime_error
-/// (`camera says 640x480, images are 752x480: ...`) where it says another.
+/// `camera` with the size of the images, where it did not say one itself, and scaled to them where
+/// it says another of the same shape, within a pixel. Throws std::runtime_error (`camera says
+/// 640x480, images are 752x480: ...`) where it says one of another shape.
 Camera MatchToImages(const Camera& camera, const cv::Size& image_size);
 
 }  // namespace rotslam

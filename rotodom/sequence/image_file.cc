@@ -160,17 +160,20 @@ bool IsKnownFormat(const Bytes& bytes) {
 
 // ---- depth
 
-// Floating-point pixels that may lie outside of what becomes 0 to 255, at either end: dead and
-// saturated ones.
-constexpr double kRareFloats = 1e-3;
+// Share of the pixels that may lie outside of a range, at either end: dead and saturated ones.
+constexpr double kRarePixels = 1e-3;
 
 bool IsFloat(const cv::Mat& image) { return image.depth() == CV_32F || image.depth() == CV_64F; }
 
-// The largest value; transparency does not count.
-double LargestOf(const cv::Mat& image) {
+// The image without its transparency, if it has one.
+cv::Mat ColoursOf(const cv::Mat& image) {
   cv::Mat colours = image;
   if (image.channels() == 4) cv::cvtColor(image, colours, cv::COLOR_BGRA2BGR);
   if (image.channels() == 2) cv::extractChannel(image, colours, 0);
+  return colours;
+}
+
+double LargestOf(const cv::Mat& colours) {
   double largest = 0.0;
   cv::minMaxLoc(colours.reshape(1), nullptr, &largest);
   return largest;
@@ -197,35 +200,69 @@ double QuantileOf(std::vector<float>& sample, double share) {
   return *place;
 }
 
+// The range of all but a few values; one unit wide where they are all the same.
+PixelRange RangeOf(std::vector<float>& sample) {
+  const double low = QuantileOf(sample, kRarePixels);
+  const double high = QuantileOf(sample, 1.0 - kRarePixels);
+  return {low, high > low ? high : low + 1.0};
+}
+
+// Brings a range to 0 to 255.
+void ConvertToEightBits(const cv::Mat& values, const PixelRange& range, cv::Mat& scaled) {
+  const double factor = 255.0 / (range.high - range.low);
+  values.convertTo(scaled, CV_8U, factor, -factor * range.low);
+}
+
+// Finds the bits and the range of 16-bit pixels.
+// @param sample  some of their values.
+void FitIntegers(double largest, std::vector<float> sample, PixelScale& scale) {
+  for (const int bits : {16, 14, 12, 10, 8}) {
+    if (largest < static_cast<double>(1 << bits)) scale.bits = bits;
+  }
+  const double divisor = scale.bits == 16 ? 257.0 : static_cast<double>(1 << (scale.bits - 8));
+  scale.integers = {0.0, 255.0 * divisor};
+  // Less than 64 of 256 grey levels are too few for corners in half-lit parts.
+  constexpr double kNarrow = 0.25;
+  // The two ends stand for pixels without a measurement: borders of rectified images, overflow.
+  std::erase_if(sample, [](float value) { return value == 0.0F || value == 65535.0F; });
+  if (scale.bits == 8 || sample.empty()) return;
+  const PixelRange used = RangeOf(sample);
+  scale.is_narrow = used.high - used.low < kNarrow * scale.integers.high;
+  if (scale.is_narrow) scale.integers = used;
+}
+
 DecodedImage Failed(std::string problem) { return {{}, std::move(problem)}; }
 
 }  // namespace
 
 PixelScale FindPixelScale(const std::vector<cv::Mat>& images) {
-  PixelScale scale;
   double largest = -1.0;
-  std::vector<float> sample;
+  std::vector<float> integers;
+  std::vector<float> floats;
   for (const cv::Mat& image : images) {
-    if (image.depth() == CV_16U) largest = std::max(largest, LargestOf(image));
-    if (IsFloat(image)) AddSample(image, sample);
+    if (image.depth() == CV_16U) {
+      const cv::Mat colours = ColoursOf(image);
+      largest = std::max(largest, LargestOf(colours));
+      AddSample(colours, integers);
+    }
+    if (IsFloat(image)) AddSample(image, floats);
   }
-  for (const int bits : {16, 14, 12, 10, 8}) {
-    if (largest >= 0.0 && largest < static_cast<double>(1 << bits)) scale.bits = bits;
-  }
-  if (!sample.empty()) {
-    scale.low = QuantileOf(sample, kRareFloats);
-    scale.high = QuantileOf(sample, 1.0 - kRareFloats);
-    if (!(scale.high > scale.low)) scale.high = scale.low + 1.0;
-  }
+  PixelScale scale;
+  if (!integers.empty()) FitIntegers(largest, std::move(integers), scale);
+  if (!floats.empty()) scale.floats = RangeOf(floats);
   return scale;
 }
 
 std::optional<std::string> Describe(const PixelScale& scale, int depth) {
   if (depth == CV_32F || depth == CV_64F) {
-    return "pixels are floating-point numbers: " + FormatNumber("%.4g", scale.low) + " to " +
-           FormatNumber("%.4g", scale.high) + " become 0 to 255";
+    return "pixels are floating-point numbers: " + FormatNumber("%.4g", scale.floats.low) + " to " +
+           FormatNumber("%.4g", scale.floats.high) + " become 0 to 255";
   }
   if (depth != CV_16U) return std::nullopt;
+  if (scale.is_narrow) {
+    return "pixels are 16 bit but use only " + FormatNumber("%.0f", scale.integers.low) + " to " +
+           FormatNumber("%.0f", scale.integers.high) + ": these become 0 to 255 in all frames";
+  }
   if (scale.bits == 16) return "pixels are 16 bit: divided by 257";
   return "pixels are " + std::to_string(scale.bits) + " bit in 16: " +
          (scale.bits == 8 ? "taken as they are"
@@ -233,24 +270,21 @@ std::optional<std::string> Describe(const PixelScale& scale, int depth) {
 }
 
 DecodedImage ToEightBits(cv::Mat image, const PixelScale& scale) {
-  if (image.channels() == 4) cv::cvtColor(image, image, cv::COLOR_BGRA2BGR);
-  if (image.channels() == 2) cv::extractChannel(image, image, 0);
+  image = ColoursOf(image);
   if (image.depth() == CV_16U) {
-    const double divisor = scale.bits == 16 ? 257.0 : static_cast<double>(1 << (scale.bits - 8));
     cv::Mat scaled;
-    image.convertTo(scaled, CV_8U, 1.0 / divisor);
+    ConvertToEightBits(image, scale.integers, scaled);
     image = scaled;
   } else if (IsFloat(image)) {
     const int num_channels = image.channels();
     cv::Mat values;
     image.convertTo(values, CV_32F);
     values = values.reshape(1);
-    cv::patchNaNs(values, scale.low);
+    cv::patchNaNs(values, scale.floats.low);
     // Infinite pixels have no place among integers.
-    values = cv::min(cv::max(values, scale.low), scale.high);
-    const double factor = 255.0 / (scale.high - scale.low);
+    values = cv::min(cv::max(values, scale.floats.low), scale.floats.high);
     cv::Mat scaled;
-    values.convertTo(scaled, CV_8U, factor, -factor * scale.low);
+    ConvertToEightBits(values, scale.floats, scaled);
     image = scaled.reshape(num_channels);
   }
   if (image.depth() == CV_8U && (image.channels() == 1 || image.channels() == 3)) {

@@ -11,16 +11,24 @@
 
 namespace rotslam {
 
+/// Pixel values that become 0 and 255; those outside become the nearer of the two.
+struct PixelRange {
+  double low = 0.0;
+  double high = 255.0;
+};
+
 /// How pixels of more than 8 bits become 8 bits, the same for all images of a sequence.
 struct PixelScale {
-  int bits = 16;        // that 16-bit pixels use: 8, 10, 12, 14 or 16
-  double low = 0.0;     // floating-point pixels that become 0
-  double high = 255.0;  // and 255
+  int bits = 16;                      // that 16-bit pixels use: 8, 10, 12, 14 or 16
+  PixelRange integers{0.0, 65535.0};  // of 16-bit pixels
+  bool is_narrow = false;             // whether `integers` is less than what the bits can hold
+  PixelRange floats;                  // of floating-point pixels
 };
 
 /// The scale that fits images as DecodeImageFile gives them, those of 8 bits and empty ones left
-/// out. The largest 16-bit value tells the bits; of floating-point pixels, all but one in a
-/// thousand at either end fit between `low` and `high`.
+/// out. The largest 16-bit value tells the bits. Where 16-bit pixels use less than a quarter of
+/// what the bits can hold, as those of a thermal camera do, that part becomes 0 to 255. A range
+/// holds all pixels but one in a thousand at either end.
 PixelScale FindPixelScale(const std::vector<cv::Mat>& images);
 
 /// What becomes of pixels of this depth, in one line: "pixels are 12 bit in 16: divided by 16";

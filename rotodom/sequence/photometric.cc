@@ -6,6 +6,7 @@
 #include <string>
 #include <vector>
 
+#include "rotodom/camera/section.h"
 #include "rotodom/sequence/image_file.h"
 #include "rotodom/types/text_file.h"
 

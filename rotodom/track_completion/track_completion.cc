@@ -235,6 +235,7 @@ class Completion {
     }
     const auto there = PlaceOf(target, point);
     if (!there || !IsInside(there->image_px)) return std::nullopt;
+    if (target.view->mask.Covers(there->image_px, kCornerReachPx)) return std::nullopt;
     const Eigen::Vector2d source_px = reference.keypoint_px + (here.image_px - here.mid_frame_px);
     const auto warp = Warp(here, *there);
     if (!warp) return std::nullopt;
@@ -248,6 +249,7 @@ class Completion {
     const auto found = Align(patch, *warp, {target.view->image, px, there->blur_px});
     if (!found || found->correlation < options_.min_correlation) return std::nullopt;
     if ((found->center_px - there->image_px).norm() > options_.reach_px) return std::nullopt;
+    if (target.view->mask.Covers(found->center_px, kCornerReachPx)) return std::nullopt;
     const auto returned =
         Align({target.view->image, found->center_px, there->blur_px}, warp->inverse(), patch);
     if (!returned || (returned->center_px - source_px).norm() > kMaxReturnPx) {
@@ -274,9 +276,10 @@ std::optional<std::string> CompletionOptions::Problem() const {
   return std::nullopt;
 }
 
-MapView MakeMapView(const cv::Mat& image) {
+MapView MakeMapView(const MaskedImage& image) {
   MapView view;
-  view.image = ToGrey(image);
+  view.image = ToGrey(image.image);
+  view.mask = image.mask;
   // The last row or column of an odd size is dropped.
   const cv::Size half(view.image.cols / 2, view.image.rows / 2);
   cv::resize(view.image(cv::Rect(0, 0, 2 * half.width, 2 * half.height)),

@@ -9,6 +9,7 @@
 #include <opencv2/core.hpp>
 
 #include "rotodom/camera/camera.h"
+#include "rotodom/masks/mask.h"
 #include "rotodom/rolling_shutter/rolling_shutter.h"
 #include "rotodom/types/reconstruction.h"
 
@@ -42,6 +43,7 @@ struct CompletionOptions {
 struct MapView {
   cv::Mat image;  // 8-bit grey
   cv::Mat half;   // the same at half the size
+  Mask mask;      // where no point is looked for
   // With a rolling shutter, the motion of the camera during the frame: rotation, and velocity of
   // the centre in world units per second.
   AngularMotion motion;
@@ -53,7 +55,7 @@ struct MapView {
 using MapViews = std::map<FrameId, MapView>;
 
 /// @param image  8-bit, grey or colour.
-MapView MakeMapView(const cv::Mat& image);
+MapView MakeMapView(const MaskedImage& image);
 
 /// Searches every point of the map in all views that should see it, by aligning the patch around it
 /// with that of a reference view, which sees the point from the middle of the others. A tracker

@@ -95,7 +95,7 @@ class Search {
     if (target_.exposure_s > 0.0) SetRates(cam_from_world);
   }
 
-  // Predicted position of the point; nullopt outside the image.
+  // Predicted position of the point; nullopt outside the image and where it is masked.
   std::optional<Eigen::Vector2d> Expect(const Candidate& candidate) const {
     const View& view = *views_[candidate.view].view;
     std::optional<Eigen::Vector2d> px = Turn(candidate.view, candidate.index);
@@ -106,7 +106,7 @@ class Search {
                                      ? target_.flow->At(view.features.keypoints_px[candidate.index])
                                      : view.flow_px_per_s[candidate.index];
     *px += flow * ahead_s;
-    if (!IsInside(*px)) return std::nullopt;
+    if (!IsVisible(*px, candidate)) return std::nullopt;
     return px;
   }
 
@@ -141,7 +141,7 @@ class Search {
       ++count;
     }
     const Eigen::Vector2d mean = sum / count;
-    if (!IsInside(mean)) return std::nullopt;
+    if (!IsVisible(mean, candidate)) return std::nullopt;
     return Location{mean, first->covariance_px};
   }
 
@@ -150,6 +150,12 @@ class Search {
     const cv::Mat& image = target_.pyramid->levels.front();
     return px.x() >= kPatchBorderPx && px.y() >= kPatchBorderPx &&
            px.x() < image.cols - 1 - kPatchBorderPx && px.y() < image.rows - 1 - kPatchBorderPx;
+  }
+
+  // Inside the image and not masked.
+  bool IsVisible(const Eigen::Vector2d& px, const Candidate& candidate) const {
+    const int level = views_[candidate.view].view->features.levels[candidate.index];
+    return IsInside(px) && !target_.pyramid->IsMasked(px, level);
   }
 
   // Position of a view's point after the rotation alone, exposed at the time of the given pixel;
@@ -280,20 +286,27 @@ class Search {
 // Correction of the predicted rotation by the majority of the probes.
 Rotation ProbeRotation(const Search& search,
                        const std::vector<Candidate>& candidates,
-                       const Camera& camera) {
+                       const Camera& camera,
+                       int num_threads) {
   // Points that are sought first, over a longer way, to correct the predicted rotation: a tenth of
   // the features, so that the correction costs less than the tracking that it saves.
   constexpr std::size_t kNumProbes = 200;
-  std::vector<BearingPair> pairs;
   const std::size_t step = std::max<std::size_t>(1, candidates.size() / kNumProbes);
-  for (std::size_t k = 0; k < candidates.size(); k += step) {
-    const auto expected_px = search.Expect(candidates[k]);
-    if (!expected_px) continue;
-    const auto found_px = search.Probe(candidates[k], *expected_px);
-    if (!found_px) continue;
+  std::vector<std::optional<BearingPair>> probes((candidates.size() + step - 1) / step);
+  ParallelFor(static_cast<int>(probes.size()), num_threads, [&](int n) {
+    const Candidate& candidate = candidates[static_cast<std::size_t>(n) * step];
+    const auto expected_px = search.Expect(candidate);
+    if (!expected_px) return;
+    const auto found_px = search.Probe(candidate, *expected_px);
+    if (!found_px) return;
     const auto expected = camera.Unproject(*expected_px);
     const auto found = camera.Unproject(*found_px);
-    if (expected && found) pairs.push_back({*expected, *found});
+    if (expected && found) probes[n] = BearingPair{*expected, *found};
+  });
+  std::vector<BearingPair> pairs;
+  pairs.reserve(probes.size());
+  for (const std::optional<BearingPair>& pair : probes) {
+    if (pair) pairs.push_back(*pair);
   }
   return AlignMostBearings(pairs).value_or(Rotation());
 }
@@ -352,7 +365,8 @@ TrackingResult TrackPoints(std::span<const OrientedView> views,
   result.cam_from_world = target.cam_from_world;
   const std::vector<Candidate> candidates = FindCandidates(views, target.max_points);
   Search search(views, target, camera, options);
-  result.cam_from_world = ProbeRotation(search, candidates, camera) * target.cam_from_world;
+  result.cam_from_world =
+      ProbeRotation(search, candidates, camera, num_threads) * target.cam_from_world;
   search.SetOrientation(result.cam_from_world);
 
   constexpr int kChunk = 64;

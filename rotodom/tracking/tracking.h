@@ -84,6 +84,7 @@ struct TrackingResult {
 /// rotation. Then each point is aligned from its prediction with the patch of the newest view that
 /// sees it, and refined against older views.
 /// @param views  newest first.
+/// Points in masked parts of the target are not tracked.
 /// @return  the same at any num_threads.
 /// Error:   about 0.03 px on clean images (tracking tests). The probes correct predictions that are
 ///          off by up to 20 px; the motion of each point may differ by up to 5 px.

@@ -10,15 +10,8 @@
 #include "rotodom/types/options.h"
 
 namespace rotslam {
-namespace {
 
-struct Overlap {
-  double shared_ratio = 0.0;
-  double parallax_rad = 0.0;  // median over the shared tracks
-};
-
-// Both sorted by track.
-Overlap Compare(const std::vector<TrackRay>& keyframe, const std::vector<TrackRay>& frame) {
+ViewOverlap OverlapOf(const std::vector<TrackRay>& keyframe, const std::vector<TrackRay>& frame) {
   std::vector<double> angles;
   auto other = frame.begin();
   for (const TrackRay& ray : keyframe) {
@@ -32,6 +25,8 @@ Overlap Compare(const std::vector<TrackRay>& keyframe, const std::vector<TrackRa
   const double overlap = static_cast<double>(angles.size()) / static_cast<double>(keyframe.size());
   return {overlap, Median(std::move(angles))};
 }
+
+namespace {
 
 // Number of keyframes so far that see each track.
 class KeyframeCounts {
@@ -88,14 +83,14 @@ std::set<FrameId> SelectFrom(const RotationMap& cam_from_world,
       if (frame.value - keyframe.value >= options.every_frames) take(frame);
       continue;
     }
-    Overlap overlap = Compare(rays(keyframe), rays(frame));
+    ViewOverlap overlap = OverlapOf(rays(keyframe), rays(frame));
     const double least_links =
         options.min_linked_ratio * static_cast<double>(rays(keyframe).size());
     const bool breaks = keyframes.size() > 1 && counts.NumLinks(rays(frame)) < least_links;
     if ((overlap.shared_ratio < options.min_shared_ratio || breaks) && before > keyframe) {
       // This frame shares too few tracks; the frame before becomes the keyframe.
       take(before);
-      overlap = Compare(rays(keyframe), rays(frame));
+      overlap = OverlapOf(rays(keyframe), rays(frame));
     }
     if (overlap.parallax_rad >= options.min_parallax_deg * kRadFromDeg ||
         overlap.shared_ratio < options.min_shared_ratio) {

@@ -42,6 +42,15 @@ struct KeyframeOptions {
   }
 };
 
+/// What a frame shares with a keyframe.
+struct ViewOverlap {
+  double shared_ratio = 0.0;  // of the keyframe's tracks
+  double parallax_rad = 0.0;  // median angle between the rays of shared tracks
+};
+
+/// @param keyframe, frame  rays in one world, by track ascending.
+ViewOverlap OverlapOf(const std::vector<TrackRay>& keyframe, const std::vector<TrackRay>& frame);
+
 /// Selects the keyframes. The first and the last frame of `cam_from_world` and of every
 /// pure-rotation segment are keyframes; there are no others within a segment.
 /// @param tracks  over all frames, not only keyframes.

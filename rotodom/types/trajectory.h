@@ -18,6 +18,15 @@ struct StampedPose {
 
 using Trajectory = std::vector<StampedPose>;  // timestamps ascending
 
+/// How the pose of a frame was found.
+enum class PoseState {
+  kMeasured,      // from the map's points
+  kHeld,          // measured but for the position of a pure rotation, or the odometry's orientation
+  kInterpolated,  // its position lies between those of frames before and after it
+  kExtrapolated,  // its position is that of the nearest frame that has one, on one side only
+  kUnplaced,      // nothing ties it to the map: its position means nothing
+};
+
 /// An orientation at a time.
 struct StampedRotation {
   double timestamp_s = 0.0;

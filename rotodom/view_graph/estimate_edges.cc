@@ -2,10 +2,12 @@
 
 #include <array>
 #include <cmath>
+#include <stdexcept>
 
 #include "rotodom/types/options.h"
 #include "rotodom/types/parallel.h"
 #include "rotodom/view_graph/consistency.h"
+#include "rotodom/view_graph/shared_points.h"
 
 namespace rotslam {
 namespace {
@@ -25,20 +27,6 @@ std::vector<KeypointCovariances> CovariancesOf(const MatchedViews& views) {
         {view_i.covariances_px[of_i].cast<double>(), view_j.covariances_px[of_j].cast<double>()});
   }
   return covariances;
-}
-
-std::vector<std::array<int, 2>> FindCommonPoints(const Features& view_i, const Features& view_j) {
-  std::vector<std::array<int, 2>> keypoints;
-  int i = 0;
-  int j = 0;
-  while (i < view_i.size() && j < view_j.size()) {
-    const TrackId track_i = view_i.tracks[i];
-    const TrackId track_j = view_j.tracks[j];
-    if (track_i == track_j) keypoints.push_back({i, j});
-    i += track_i <= track_j;
-    j += track_j <= track_i;
-  }
-  return keypoints;
 }
 
 // Makes an edge of an estimate and its keypoints.
@@ -75,10 +63,7 @@ struct EdgeHypotheses {
   std::vector<double> excesses;
 };
 
-EdgeHypotheses HypothesesByMatches(const MatchedViews& views,
-                                   const Rotation& predicted_j_from_i,
-                                   double focal_px,
-                                   const EdgeOptions& options) {
+std::vector<BearingPair> PairsOf(const MatchedViews& views) {
   const auto& [view_i, view_j, keypoints, noise] = views;
   std::vector<BearingPair> pairs;
   pairs.reserve(keypoints.size());
@@ -86,18 +71,32 @@ EdgeHypotheses HypothesesByMatches(const MatchedViews& views,
     pairs.push_back({view_i.bearings[of_i], view_j.bearings[of_j]});
   }
   for (std::size_t k = 0; k < noise.size(); ++k) pairs[k].noise = noise[k];
-  const FrameId i = view_i.frame;
-  const FrameId j = view_j.frame;
+  return pairs;
+}
+
+RelativeRotationOptions OptionsFor(const MatchedViews& views, const EdgeOptions& options) {
+  RelativeRotationOptions pair_options = options.relative_rotation;
+  pair_options.shared_error_px = std::hypot(
+      pair_options.shared_error_px, views.view_i.shared_error_px, views.view_j.shared_error_px);
+  return pair_options;
+}
+
+EdgeHypotheses HypothesesByMatches(const MatchedViews& views,
+                                   const Rotation& predicted_j_from_i,
+                                   double focal_px,
+                                   const EdgeOptions& options) {
+  const FrameId i = views.view_i.frame;
+  const FrameId j = views.view_j.frame;
   const std::uint64_t seed = options.seed * 0x9E3779B97F4A7C15ULL +
                              (std::uint64_t(i.value) << 32 | std::uint32_t(j.value));
-  RelativeRotationOptions pair_options = options.relative_rotation;
-  pair_options.shared_error_px =
-      std::hypot(pair_options.shared_error_px, view_i.shared_error_px, view_j.shared_error_px);
-  const std::vector<KeypointCovariances> covariances = CovariancesOf(views);
   EdgeHypotheses hypotheses;
-  for (const RelativeRotationEstimate& estimate : EstimateRotationHypotheses(
-           {pairs, covariances}, predicted_j_from_i, focal_px, pair_options, seed)) {
-    hypotheses.connections.push_back(EdgeWithMatchesOf(estimate, i, j, keypoints));
+  for (const RelativeRotationEstimate& estimate :
+       EstimateRotationHypotheses({PairsOf(views), CovariancesOf(views)},
+                                  predicted_j_from_i,
+                                  focal_px,
+                                  OptionsFor(views, options),
+                                  seed)) {
+    hypotheses.connections.push_back(EdgeWithMatchesOf(estimate, i, j, views.keypoints));
     hypotheses.excesses.push_back(estimate.excess);
   }
   return hypotheses;
@@ -166,6 +165,39 @@ std::vector<EdgeWithMatches> EstimateEdges(const Features& view,
   found.reserve(hypotheses.size());
   for (std::size_t k = 0; k < hypotheses.size(); ++k) {
     found.push_back(std::move(hypotheses[k].connections[chosen[k]]));
+  }
+  return found;
+}
+
+std::vector<EdgeWithMatches> UpdateEdges(const Features& view,
+                                         const std::vector<const Features*>& others,
+                                         const std::vector<RelativeRotation>& known,
+                                         const RotationMap& predicted_cam_from_world,
+                                         double focal_px,
+                                         const EdgeOptions& options) {
+  if (known.size() != others.size()) {
+    throw std::invalid_argument("UpdateEdges: not one edge per view");
+  }
+  std::vector<std::optional<EdgeWithMatches>> updated(others.size());
+  const Rotation& view_from_world = predicted_cam_from_world.at(view.frame);
+  ParallelFor(static_cast<int>(others.size()), options.num_threads, [&](int k) {
+    const auto keypoints = FindCommonPoints(*others[k], view);
+    const MatchedViews views{*others[k], view, keypoints};
+    const Rotation& other_from_world = predicted_cam_from_world.at(others[k]->frame);
+    const auto estimate =
+        UpdateRelativeRotation({PairsOf(views), CovariancesOf(views)},
+                               {known[k].j_from_i, known[k].translation_direction},
+                               view_from_world * other_from_world.Inverse(),
+                               focal_px,
+                               OptionsFor(views, options));
+    if (estimate) {
+      updated[k] = EdgeWithMatchesOf(*estimate, others[k]->frame, view.frame, keypoints);
+    }
+  });
+  std::vector<EdgeWithMatches> found;
+  found.reserve(updated.size());
+  for (std::optional<EdgeWithMatches>& edge : updated) {
+    if (edge) found.push_back(*std::move(edge));
   }
   return found;
 }

@@ -81,4 +81,15 @@ std::vector<EdgeWithMatches> EstimateEdges(const Features& view,
                                            double focal_px,
                                            const EdgeOptions& options);
 
+/// Estimates known edges again after the bearings of their views have changed a little
+/// (UpdateRelativeRotation).
+/// @param known  edges from `others` to `view`, in the same order.
+/// @return  as EstimateEdges.
+std::vector<EdgeWithMatches> UpdateEdges(const Features& view,
+                                         const std::vector<const Features*>& others,
+                                         const std::vector<RelativeRotation>& known,
+                                         const RotationMap& predicted_cam_from_world,
+                                         double focal_px,
+                                         const EdgeOptions& options);
+
 }  // namespace rotslam

@@ -142,6 +142,26 @@ TEST(ResectFrame, PointsThatFitARotationWithinTheirDeviationsDoNotRefuteIt) {
   EXPECT_NEAR(turn_deg(1.0), 0.2, 0.01);
 }
 
+TEST(AssessPose, TellsAboutAPoseWhatResectionWould) {
+  const PointsInView view = MakeView(CameraModel::kPinhole, 300, 0.5, 0.1);
+  const auto found = ResectFrame(view.camera, view.observations, NearStart(view, 0.5, 0.2), {});
+  ASSERT_TRUE(found);
+  ResectionStart pose{found->cam_from_world, found->center_in_world, std::nullopt};
+  const auto assessed = AssessPose(view.camera, view.observations, pose, {});
+  ASSERT_TRUE(assessed);
+  EXPECT_EQ(assessed->center_in_world, found->center_in_world);
+  EXPECT_EQ(assessed->num_inliers, found->num_inliers);
+  EXPECT_EQ(assessed->variance_factor, found->variance_factor);
+  EXPECT_EQ(assessed->covariance, found->covariance);
+  // A pose that is a little off stays, and its residuals tell.
+  pose.center_in_world.x() += 0.05;
+  const auto off = AssessPose(view.camera, view.observations, pose, {});
+  ASSERT_TRUE(off);
+  EXPECT_EQ(off->center_in_world, pose.center_in_world);
+  EXPECT_GT(off->variance_factor, 1.5 * found->variance_factor);
+  EXPECT_FALSE(AssessPose(view.camera, {}, pose, {}));
+}
+
 TEST(ResectFrame, SaysNoToTooLittle) {
   const PointsInView view = MakeView(CameraModel::kPinhole, 100, 0.0, 0.0);
   const ResectionStart start = NearStart(view, 0.5, 0.2);

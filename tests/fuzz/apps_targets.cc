@@ -6,11 +6,12 @@
 #include "apps/batch/list.h"
 #include "apps/batch/record.h"
 #include "apps/cli/input/config.h"
-#include "apps/cli/input/focal_guess.h"
+#include "apps/cli/input/lens_guess.h"
 #include "apps/cli/input/run_options.h"
 #include "apps/cli/run_directory/checkpoint.h"
 #include "apps/cli/run_directory/unfinished.h"
 #include "apps/simulation/paths.h"
+#include "rotodom/loop/looped_odometry.h"
 #include "tests/fuzz/fuzz_target.h"
 
 namespace rotslam {
@@ -76,7 +77,7 @@ class InterruptedRun {
       record_ = archive.TakeBytes();
       checkpoint.Append(recorded);
     }
-    checkpoint.Commit(odometry.SaveState());
+    checkpoint.Commit({odometry.SaveState(), ""});
     state_ = ReadWholeFile(UnfinishedFolder(run) / "state.bin");
   }
 
@@ -88,7 +89,7 @@ class InterruptedRun {
     Checkpoint checkpoint(run_, {0, true}, kIdentity, progress_);
     while (checkpoint.NextRecorded()) continue;
     LoopedOdometry odometry = Odometry();
-    checkpoint.Restore(odometry);
+    checkpoint.Restore([&](const TrackingState& state) { odometry.RestoreState(state.odometry); });
   }
 
  private:

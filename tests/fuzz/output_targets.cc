@@ -53,15 +53,13 @@ const RegisterFuzzTarget g2o("g2o", [](std::string_view bytes, const TemporaryFo
   ReadG2o(folder.Write("graph.g2o", std::string(bytes)));
 });
 
-const RegisterFuzzTarget rotation_list("rotation_list",
-                                       [](std::string_view bytes, const TemporaryFolder& folder) {
-                                         const RotationList list = ReadRotationList(
-                                             folder.Write("graph", std::string(bytes)), 0.01);
-                                         RotationMap all = list.cam_from_world;
-                                         for (std::size_t k = 0; k < list.ids.size(); ++k)
-                                           all[FrameId{static_cast<int>(k)}];
-                                         WriteRotationList(folder.path() / "copy.g2o", list, all);
-                                       });
+const RegisterFuzzTarget rotation_list(
+    "rotation_list", [](std::string_view bytes, const TemporaryFolder& folder) {
+      const RotationList list = ReadRotationList(folder.Write("graph", std::string(bytes)), 0.01);
+      RotationMap all = list.cam_from_world;
+      for (std::size_t k = 0; k < list.ids.size(); ++k) all[FrameId{static_cast<int>(k)}];
+      WriteRotationList(folder.path() / "copy.g2o", list, {all, list.center_in_world, {}});
+    });
 
 const RegisterFuzzTarget known_rotation("known_rotation",
                                         [](std::string_view bytes, const TemporaryFolder& folder) {
@@ -77,7 +75,11 @@ void ReadColmap(std::string_view bytes, const TemporaryFolder& folder, const cha
   folder.Write(name + "cameras." + ending, files[0]);
   folder.Write(name + "images." + ending, files[1]);
   folder.Write(name + "points3D." + ending, files[2]);
-  ReadColmapModel(folder.path() / name);
+  const ColmapModel model = ReadColmapModel(folder.path() / name);
+  for (const ColmapForm form : {ColmapForm::kText, ColmapForm::kBinary}) {
+    WriteColmapModel(folder.path() / "copy", model, model.reconstruction, form);
+  }
+  FiguresOf(model, model.reconstruction);
 }
 
 const RegisterFuzzTarget colmap_text("colmap_text",

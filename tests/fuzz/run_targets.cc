@@ -12,6 +12,7 @@
 #include "output/graph/g2o.h"
 #include "output/map/map_keypoints.h"
 #include "output/map/ply.h"
+#include "output/tables/poses_csv.h"
 #include "output/tables/summary.h"
 #include "output/trajectory/trajectory.h"
 #include "tests/fuzz/fuzz_target.h"
@@ -73,6 +74,11 @@ void WriteRun(const fs::path& run) {
   graph.AddEdge({FrameId{0}, FrameId{1}, Rotation()});
   WriteRotationsCsv(run / "rotations.csv", rows);
   WriteTumTrajectory(run / "trajectory_tum.txt", poses);
+  std::vector<PoseRow> states;
+  for (int n = 0; n < kNumFrames; ++n) {
+    states.push_back({n, poses[n], Eigen::Vector3d(0.1, 0.1, 0.1), PoseState::kHeld, 0, "held"});
+  }
+  WritePosesCsv(run / "poses.csv", states);
   WriteSegments(run / "segments.csv", {{0, kNumFrames - 1, "rotating", 0, "tracks", 0.9}});
   WriteLoopsCsv(run / "loops.csv", {{3, 0, 0.5, 123, 1.25, true, 1.002, 0.75}});
   WriteG2o(run / "view_graph.g2o", {graph, cam_from_world, {}});
@@ -102,6 +108,7 @@ auto ReportWith(const std::string& file) {
 const RegisterFuzzTarget summary("run_summary", ReportWith("summary.json"));
 const RegisterFuzzTarget rotations("run_rotations", ReportWith("rotations.csv"));
 const RegisterFuzzTarget segments("run_segments", ReportWith("segments.csv"));
+const RegisterFuzzTarget states("run_states", ReportWith("poses.csv"));
 const RegisterFuzzTarget loops("run_loops", ReportWith("loops.csv"));
 const RegisterFuzzTarget graph("run_graph", ReportWith("view_graph.g2o"));
 const RegisterFuzzTarget cloud("run_cloud", ReportWith("map_all_frames.bin"));

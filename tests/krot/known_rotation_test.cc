@@ -4,10 +4,14 @@
 #include <cmath>
 #include <limits>
 #include <map>
+#include <set>
 #include <stdexcept>
+#include <utility>
 
+#include <Eigen/Geometry>
 #include <gtest/gtest.h>
 
+#include "krot/rotation_convention.h"
 #include "tests/scenes/alignment.h"
 #include "tests/scenes/scene.h"
 
@@ -386,6 +390,95 @@ TEST(SolveKnownRotation, BadObservationsAreRemovedWithTheirReason) {
   EXPECT_EQ(solution.removed[0].reason, RemovalReason::kNotFinite);
   EXPECT_EQ(solution.removed[1].reason, RemovalReason::kDuplicate);
   EXPECT_EQ(solution.removed[2].track, scene.tracks[5].id);
+}
+
+// Centres and points of the bisection are those that have the upper bound.
+TEST(SolveKnownRotation, AttainsTheBracketThatItReports) {
+  for (const double rotation_noise_deg : {0.0, 0.1}) {
+    SceneOptions scene_options = Street(15, 300);
+    scene_options.noise_px = 0.7;
+    scene_options.rotation_noise_deg = rotation_noise_deg;
+    scene_options.outlier_ratio = 0.02;
+    const Scene scene = MakeScene(scene_options);
+    KrotOptions options;
+    options.start = KrotStart::kBisection;
+    const KrotSolution solution = Solve(scene, options);
+    ASSERT_EQ(solution.status, KrotStatus::kConverged) << solution.message;
+    std::set<std::pair<TrackId, FrameId>> removed;
+    for (const RemovedObservation& one : solution.removed) removed.insert({one.track, one.frame});
+    double largest = 0.0;
+    int count = 0;
+    for (const Track& track : scene.tracks) {
+      const auto point = solution.point_in_world.find(track.id);
+      if (point == solution.point_in_world.end()) continue;
+      for (const Observation& observation : track.observations) {
+        if (removed.contains({track.id, observation.frame})) continue;
+        const Eigen::Vector3d seen =
+            scene.cam_from_world.at(observation.frame) *
+            (point->second - solution.center_in_world.at(observation.frame));
+        ASSERT_GT(seen.z(), 0.0);
+        const Eigen::Vector2d miss = seen.hnormalized() - observation.bearing.hnormalized();
+        largest = std::max(largest, miss.cwiseAbs().maxCoeff());
+        ++count;
+      }
+    }
+    EXPECT_EQ(count, solution.num_bracket_observations);
+    EXPECT_NEAR(largest, solution.gamma_high, 1e-9);
+    EXPECT_GE(solution.gamma_low, 0.99 * solution.gamma_high);
+  }
+}
+
+TEST(SolveKnownRotation, SaysWhenRotationsContradictTheTracks) {
+  SceneOptions scene_options = Street(15, 600);
+  scene_options.path = ScenePath::kRing;
+  scene_options.noise_px = 0.5;
+  Scene scene = MakeScene(scene_options);
+  EXPECT_EQ(Solve(scene).status, KrotStatus::kConverged);
+  for (auto& [view, rotation] : scene.cam_from_world) rotation = rotation.Inverse();
+  const KrotSolution solution = Solve(scene);
+  EXPECT_NE(solution.status, KrotStatus::kConverged) << solution.message;
+  EXPECT_NE(solution.status, KrotStatus::kIterationLimit) << solution.message;
+}
+
+// Rotations in other conventions are told from right ones, and read back.
+TEST(CheckConvention, FindsTheConventionThatFits) {
+  SceneOptions scene_options;
+  scene_options.num_views = 20;
+  scene_options.num_points = 300;
+  scene_options.noise_px = 0.5;
+  const Scene scene = MakeScene(scene_options);
+  const ConventionCheck right = CheckConvention(scene.cam_from_world, scene.tracks);
+  EXPECT_GT(right.num_pairs, 3);
+  EXPECT_LT(right.given_deg, 0.1);
+  EXPECT_EQ(right.other, "");
+  const auto read_back = [&](auto change) {
+    RotationMap changed;
+    for (const auto& [view, rotation] : scene.cam_from_world) changed[view] = change(rotation);
+    ConventionCheck check = CheckConvention(changed, scene.tracks);
+    EXPECT_GT(check.given_deg, 4.0 * check.other_deg);
+    // Up to a common rotation of the world.
+    EXPECT_EQ(check.cam_from_world.size(), scene.cam_from_world.size());
+    for (const auto& [view, rotation] : check.cam_from_world) {
+      const Rotation relative = rotation * check.cam_from_world.begin()->second.Inverse();
+      const Rotation expected =
+          scene.cam_from_world.at(view) * scene.cam_from_world.begin()->second.Inverse();
+      EXPECT_LT((relative.Inverse() * expected).AngleDeg(), 1e-6) << check.other;
+    }
+    return check.other;
+  };
+  EXPECT_EQ(read_back([](const Rotation& r) { return r.Inverse(); }), "taken for world->camera");
+  // Numbers w x y z that were read as x y z w.
+  EXPECT_EQ(read_back([](const Rotation& r) {
+              const Eigen::Quaterniond q = r.Inverse().Quaternion();
+              return Rotation(Eigen::Quaterniond(q.z(), q.w(), q.x(), q.y())).Inverse();
+            }),
+            "taken for camera->world with qw in front");
+  // A body with x forward, y left, z up.
+  Eigen::Matrix3d body_from_cam;
+  body_from_cam << 0, 0, 1, -1, 0, 0, 0, -1, 0;
+  const Rotation turn = Rotation::FromMatrix(body_from_cam);
+  EXPECT_EQ(read_back([&](const Rotation& r) { return turn * r; }),
+            "taken for camera->world of a body whose axes -y, -z, x are the camera's x, y, z");
 }
 
 TEST(SolveKnownRotation, BrokenContractsThrow) {

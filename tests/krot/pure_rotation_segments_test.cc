@@ -47,6 +47,24 @@ std::vector<PureRotationSegment> Find(const Path& path, const PureRotationOption
   return FindPureRotationSegments(path.graph, path.cam_from_world, options);
 }
 
+// Whatever the edges say of a baseline: the first ten frames rest, the others rotate.
+TEST(AllFramesAsSegment, SaysWhereTheCameraRests) {
+  Path path = MakePath(WalkStopWalk(20, 0, 0));
+  ViewGraph graph;
+  for (RelativeRotation edge : path.graph.edges()) {
+    if (edge.j <= FrameId{9}) edge.j_from_i = Rotation();
+    edge.covariance = 1e-8 * Eigen::Matrix3d::Identity();
+    graph.AddEdge(edge);
+  }
+  const PureRotationSegment all = AllFramesAsSegment(graph, path.cam_from_world, {});
+  EXPECT_EQ(all.first, FrameId{0});
+  EXPECT_EQ(all.last, FrameId{20});
+  EXPECT_EQ(all.evidence, 0.0);
+  ASSERT_EQ(all.still.size(), 1u);
+  EXPECT_EQ(all.still[0].first, FrameId{0});
+  EXPECT_NEAR(all.still[0].last.value, 9, 2);
+}
+
 TEST(FindPureRotationSegments, FindsTheTurnInPlace) {
   const auto stretches = Find(MakePath(WalkStopWalk(10, 15, 10)));
   ASSERT_EQ(stretches.size(), 1u);

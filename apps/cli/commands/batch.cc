@@ -3,6 +3,7 @@
 #include <filesystem>
 #include <memory>
 #include <optional>
+#include <sstream>
 #include <stdexcept>
 #include <string>
 #include <system_error>
@@ -34,6 +35,7 @@ struct BatchFlags {
   int only = 0;  // number of the one sequence to run, from 1; 0: all
   bool collect = false;
   std::string slurm;
+  std::string slurm_options;
   CheckpointFlags checkpoint;  // `resume` is decided for each sequence
 
   int ThreadsPerJob() const { return std::max(1, common.NumThreads() / jobs); }
@@ -80,6 +82,7 @@ std::vector<std::string> ArgumentsOf(const Task& task, bool resume, const BatchF
   add("--camera", entry.camera);
   add("--vocabulary", entry.vocabulary);
   add("--rotations", entry.rotations);
+  if (entry.align) arguments.emplace_back("--align");
   return arguments;
 }
 
@@ -118,12 +121,17 @@ class Runner {
   void Start(int k) {
     const Task& task = tasks_[k];
     const bool resume = WasInterrupted(task.directory, task.request);
+    BatchRecord record{task.request, std::nullopt, ""};
+    if (const auto before = ReadRecord(task.directory); resume && before) {
+      record.earlier_cpu_s = before->end ? before->end->cpu_s : before->earlier_cpu_s;
+      record.earlier_wall_s = before->end ? before->end->wall_s : before->earlier_wall_s;
+    }
     try {
       PrepareRunDirectory(task.directory.string());
       // What says that a run is whole must not be left from an older one.
       fs::remove(task.directory / "summary.json");
       ReplaceFile(task.directory / "batch_options.yaml", OptionsFileOf(task.entry));
-      WriteRecord(task.directory, {task.request, std::nullopt, ""});
+      WriteRecord(task.directory, record);
       children_.Start(k, ArgumentsOf(task, resume, flags_), LogOf(k));
     } catch (const std::runtime_error& error) {
       progress_.Warn(Name(k) + error.what());
@@ -136,6 +144,12 @@ class Runner {
   void Finish(const std::pair<int, ChildEnd>& ended) {
     const int k = ended.first;
     BatchRecord record{tasks_[k].request, ended.second, ""};
+    if (const auto started = ReadRecord(tasks_[k].directory)) {
+      record.earlier_cpu_s = started->earlier_cpu_s;
+      record.earlier_wall_s = started->earlier_wall_s;
+      record.end->cpu_s += record.earlier_cpu_s;
+      record.end->wall_s += record.earlier_wall_s;
+    }
     if (record.end->exit_code != 0) record.error = LastErrorLine(LogOf(k));
     WriteRecord(tasks_[k].directory, record);
     if (record.end->exit_code == 0) {
@@ -192,6 +206,21 @@ int WriteSlurm(const std::vector<Task>& tasks, const BatchFlags& flags) {
   job.num_sequences = static_cast<int>(tasks.size());
   if (flags.jobs_given) job.max_running = flags.jobs;
   job.num_threads = flags.ThreadsPerJob();
+  std::istringstream words(flags.slurm_options);
+  for (std::string word; words >> word;) {
+    if (!word.starts_with('-') && job.options.empty()) {
+      throw std::runtime_error(
+          "--slurm-options: expected options of sbatch such as "
+          "\"--time=2:00:00 --mem=8G\", found \"" +
+          word + "\"");
+    }
+    // A value that stands apart belongs to the option before.
+    if (word.starts_with('-')) {
+      job.options.push_back(word);
+    } else {
+      job.options.back() += " " + word;
+    }
+  }
   ReplaceFile(flags.slurm, SlurmScript(job));
   Progress(flags.common)
       .Say("wrote " + flags.slurm + "; submit it with sbatch, then collect with --collect");
@@ -244,6 +273,11 @@ void AddBatchCommand(CLI::App& app, Action& action) {
       "--collect", flags->collect, "Run nothing, write the table of what is done");
   CLI::Option* slurm = command->add_option(
       "--slurm", flags->slurm, "Run nothing, write an array job of Slurm to this file");
+  command
+      ->add_option("--slurm-options",
+                   flags->slurm_options,
+                   "Further options of sbatch for --slurm: \"--time=2:00:00 --mem=8G\"")
+      ->needs(slurm);
   only->excludes(collect)->excludes(slurm);
   collect->excludes(slurm);
   AddCheckpointEveryFlag(*command, flags->checkpoint);
@@ -254,10 +288,12 @@ void AddBatchCommand(CLI::App& app, Action& action) {
       "    name: kitti00                     # folder below --out, of a-z A-Z 0-9 . _ -;\n"
       "                                      # else the last part of path\n"
       "    command: run                      # or rotations\n"
-      "    camera: calib.txt                 # else what lies with the images\n"
+      "    camera: calib.txt                 # else what lies with the images; none: as --camera "
+      "none\n"
       "    ground_truth: kitti/poses/00.txt  # else what lies with the images\n"
       "    times: kitti/00/times.txt         # timestamps of a KITTI ground truth\n"
       "    rotations: gimbal.csv             # as --rotations of run\n"
+      "    align: true                       # as --align\n"
       "    vocabulary: ORBvoc.txt            # as --vocabulary\n"
       "    config: kitti.yaml                # else --config\n"
       "    options: {loop: {use_loops: false}, sequence: {stride: 2}}  # over those of config\n"

@@ -11,7 +11,13 @@
 #include "apps/cli/command.h"
 #include "apps/cli/commands/checkerboard.h"
 #include "apps/cli/input/config.h"
+#include "apps/cli/input/lens_guess.h"
+#include "apps/cli/input/run_options.h"
+#include "apps/cli/terminal/interruption.h"
 #include "apps/cli/terminal/progress.h"
+#include "apps/cli/terminal/slam_progress.h"
+#include "apps/slam/lens_estimation.h"
+#include "apps/slam/working_size/original_size.h"
 #include "output/files/atomic_file.h"
 #include "rotodom/camera/read_camera.h"
 #include "rotodom/sequence/sequence.h"
@@ -137,7 +143,45 @@ void WarnOfWeakness(const BoardCalibration& calibration, Progress& progress) {
   }
 }
 
+// A camera file from any film: EstimateLens.
+int CalibrateWithoutBoard(const CalibrateFlags& flags) {
+  Progress progress(flags.common);
+  SequenceOptions sequence_options;
+  sequence_options.stride = std::max(1, flags.stride);
+  SequenceSource original(flags.images, sequence_options);
+  const cv::Size size = original.sequence().image_size();
+  progress.Say("input:  " + original.sequence().Describe());
+  RunOptions options;
+  options.seed = flags.common.seed;
+  options.num_threads = flags.common.NumThreads();
+  const FocalGuess guess = GuessFocal(flags.images, sequence_options, size);
+  const WorkingSize working(size, options.max_image_side_px);
+  ReducedFrames frames(original, working);
+  const Interruption interruption;
+  SlamProgress observer(options, working, interruption, progress);
+  const LensEstimate estimate =
+      EstimateLens(frames,
+                   {working.Reduced(UncalibratedCamera(size, guess.focal_px)), guess.is_from_exif},
+                   options,
+                   observer);
+  if (estimate.interrupted) return Interruption::kExitCode;
+  if (!estimate.is_found) {
+    throw std::runtime_error(flags.images +
+                             ": the images do not tell the lens: film with turns, from several "
+                             "places, things near and far; or film a printed checkerboard "
+                             "(--checkerboard)");
+  }
+  const Camera camera = working.Original(estimate.camera);
+  LensSigmas sigmas = estimate.sigmas;
+  ToOriginalSize(working, sigmas);
+  ReplaceFile(flags.out, "# Estimated from " + flags.images + ".\n" + CameraYaml(camera, sigmas));
+  progress.Say("camera: " + Describe(camera));
+  progress.Say("wrote " + flags.out);
+  return 0;
+}
+
 int Calibrate(const CalibrateFlags& flags) {
+  if (flags.checkerboard.empty()) return CalibrateWithoutBoard(flags);
   const Checkerboard board = BoardOf(flags);
   Progress progress(flags.common);
   BoardCalibrationOptions options;
@@ -169,18 +213,20 @@ int Calibrate(const CalibrateFlags& flags) {
 
 void AddCalibrateCommand(CLI::App& app, Action& action) {
   const auto flags = std::make_shared<CalibrateFlags>();
-  CLI::App* command =
-      app.add_subcommand("calibrate", "A camera file from images of a printed checkerboard");
+  CLI::App* command = app.add_subcommand(
+      "calibrate", "A camera file from images of a printed checkerboard, or from any film");
   command
-      ->add_option("images",
-                   flags->images,
-                   "Images or video of the board: whole, from many sides, up to the corners")
+      ->add_option(
+          "images",
+          flags->images,
+          "Images or video: of the board, whole, from many sides, up to the corners; or of "
+          "any place")
       ->required();
-  command
-      ->add_option("--checkerboard",
-                   flags->checkerboard,
-                   "Inner corners, where four squares meet, as COLUMNSxROWS")
-      ->required();
+  command->add_option(
+      "--checkerboard",
+      flags->checkerboard,
+      "Inner corners, where four squares meet, as COLUMNSxROWS; without it the lens is "
+      "estimated from any film in which the camera turns and moves");
   command
       ->add_option("--square",
                    flags->square_m,

@@ -84,8 +84,13 @@ int InspectSequence(const InspectFlags& flags) {
   for (const std::string& line : DescribeSequence(input.sequence())) PrintLine(line);
   int exit_code = 0;
   try {
-    ReadCalibration(input_flags, input);
-    for (const std::string& line : DescribeCamera(input)) PrintLine(line);
+    if (ReadCalibration(input_flags, input)) {
+      for (const std::string& line : DescribeCamera(input)) PrintLine(line);
+    } else {
+      PrintLine(
+          "camera: no calibration lies with the images; `rotslam run` then estimates the lens from "
+          "them");
+    }
   } catch (const std::runtime_error& error) {
     PrintLine(std::string("camera: ") + error.what());
     exit_code = 1;
@@ -123,6 +128,7 @@ int InspectGraph(const fs::path& path) {
             std::to_string(list.edges.size()) + " edges, " + std::to_string(num_components) +
             (num_components == 1 ? " component" : " components"));
   PrintNotes(list.notes);
+  if (!list.unread.empty()) PrintNotes({"not read: " + list.unread});
   return 0;
 }
 

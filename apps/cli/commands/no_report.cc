@@ -1,8 +1,9 @@
-// Stands in for report.cc and plot.cc in a build without them (ROTSLAM_REPORT=OFF).
+// Stands in for report.cc, plot.cc and live_page.cc in a build without them (ROTSLAM_REPORT=OFF).
 
 #include <stdexcept>
 
 #include "apps/cli/command.h"
+#include "apps/cli/live/live_page.h"
 #include "apps/cli/run_directory/run_report.h"
 
 namespace rotslam {
@@ -31,5 +32,13 @@ void AddReportFlag(CLI::App& command, bool& use_report) {
 void AddReportCommand(CLI::App& app, Action& action) { AddRefusal(app, "report", action); }
 
 void AddPlotCommand(CLI::App& app, Action& action) { AddRefusal(app, "plot", action); }
+
+void AddLivePageFlags(CLI::App&, LivePageFlags&) {}
+
+std::function<void(const LiveOutputs::Shown&)> OpenLivePage(const LivePageFlags&,
+                                                            const Camera&,
+                                                            Progress&) {
+  return nullptr;
+}
 
 }  // namespace rotslam

@@ -29,9 +29,10 @@ int FindAndWriteRotations(const RotationsFlags& flags) {
   const Orientations& orientations = tracked.orientations;
   Progress& progress = tracked.progress;
 
+  tracked.ToOriginalSize();
   RunSummary summary =
       StartSummary("rotations", input, orientations, DescribeOptions(tracked.options));
-  if (input.guess) summary.seconds.push_back({"focal_guess", tracked.guess_s});
+  if (input.guess) summary.seconds.push_back({"lens", tracked.lens_s});
   summary.seconds.push_back({"total", SecondsSince(tracked.start)});
   WriteSummary(tracked.outputs.folder() / "summary.json", summary);
   tracked.outputs.Publish();

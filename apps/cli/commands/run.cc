@@ -12,8 +12,11 @@
 #include "apps/cli/run_directory/run_report.h"
 #include "apps/cli/run_directory/summary_parts.h"
 #include "apps/cli/terminal/describe.h"
+#include "apps/report/run_check.h"
 #include "apps/slam/build_map.h"
-#include "apps/slam/focal_length.h"
+#include "apps/slam/lens_estimation.h"
+#include "apps/slam/map/stated_sigmas.h"
+#include "rotodom/camera/read_camera.h"
 #include "rotodom/types/stopwatch.h"
 
 namespace rotslam {
@@ -45,7 +48,7 @@ void WriteInterrupted(const TrackedInput& tracked, double orientations_s) {
   RunSummary summary =
       StartSummary("run", tracked.input, tracked.orientations, DescribeOptions(tracked.options));
   summary.interrupted = true;
-  if (tracked.input.guess) summary.seconds.push_back({"focal_guess", tracked.guess_s});
+  if (tracked.input.guess) summary.seconds.push_back({"lens", tracked.lens_s});
   summary.seconds.push_back({"orientations", orientations_s});
   summary.seconds.push_back({"total", SecondsSince(tracked.start)});
   WriteSummary(tracked.outputs.folder() / "summary.json", summary);
@@ -69,16 +72,17 @@ RunSummary SummariseRun(const TrackedInput& tracked, const MapResult& positions)
   }
   if (input.guess) {
     summary.calibration = SummaryOf(*input.guess, positions.camera);
-    summary.seconds.push_back({"focal_guess", tracked.guess_s});
+    summary.seconds.push_back({"lens", tracked.lens_s});
   }
   return summary;
 }
 
-// Warns of scales that are a guess, of a guessed focal length and of a map without positions.
-void Warn(const MapResult& positions,
+// Warns of scales that are a guess, of a lens that was estimated and of a map without positions.
+void Warn(const TrackedInput& tracked,
+          const MapResult& positions,
           const std::vector<Segment>& segments,
-          const Input& input,
           Progress& progress) {
+  const Input& input = tracked.input;
   for (int k = 1; k < std::ssize(positions.components); ++k) {
     progress.Warn("the map from frame " +
                   std::to_string(FirstFrame(segments, positions.components[k], k)) +
@@ -88,10 +92,10 @@ void Warn(const MapResult& positions,
                   "picture");
   }
   if (input.guess) progress.Warn(WarningOf(*input.guess, positions.camera));
-  if (!positions.rotates_throughout) return;
+  if (!positions.rotates_throughout || tracked.orientations.CameraStands()) return;
   progress.Warn(
-      "the camera never leaves its place, it only rotates: the result has orientations, no "
-      "positions and no points. For a map, walk while you film" +
+      "the camera never leaves its place (it rests, rotates or trembles): the result has "
+      "orientations, no positions and no points. For a map, walk while you film" +
       (RotatesByLens(positions, input)
            ? ". With the calibration given the camera seems to move; without movement "
              "this one fits better: " +
@@ -99,14 +103,19 @@ void Warn(const MapResult& positions,
            : std::string()));
 }
 
-int Run(const RunFlags& flags) {
-  TrackedInput tracked("run", flags.track, RunOptionsOf(flags), true);
+}  // namespace
+
+int FinishRun(TrackedInput& tracked, const RunOutputFlags& flags) {
   const Input& input = tracked.input;
   const Orientations& orientations = tracked.orientations;
   const std::filesystem::path& folder = tracked.outputs.folder();
   Progress& progress = tracked.progress;
-  if (input.guess) FreeFocalLength(tracked.options.ba.lens);
-  const double orientations_s = SecondsSince(tracked.start) - tracked.guess_s;
+  if (input.guess) {
+    FreeLens(PlainLens(tracked.working.Reduced(input.camera)), tracked.options.ba.lens);
+  } else if (input.lens_sigmas) {
+    TakeStatedSigmas(*input.lens_sigmas, input.camera, tracked.options.ba.lens);
+  }
+  const double orientations_s = SecondsSince(tracked.start) - tracked.lens_s;
   const auto end_early = [&] {
     WriteInterrupted(tracked, orientations_s);
     progress.Warn(DescribeInterrupted(tracked.directory, orientations, tracked.checkpoint));
@@ -116,14 +125,19 @@ int Run(const RunFlags& flags) {
     return Interruption::kExitCode;
   }
 
-  const MapResult positions = [&] {
+  MapResult positions = [&] {
     const EndAtInterruption end_at_interruption(tracked.interruption, end_early);
-    return BuildMap(orientations, tracked.options, input.frames.get(), tracked.observer);
+    return BuildMap(orientations, tracked.options, &tracked.frames, tracked.observer);
   }();
-  const double positions_s = SecondsSince(tracked.start) - orientations_s - tracked.guess_s;
+  tracked.ToOriginalSize(positions);
+  tracked.ToOriginalSize();
+  const double positions_s = SecondsSince(tracked.start) - orientations_s - tracked.lens_s;
   WritePositions(folder, orientations, positions, flags.ascii ? PlyForm::kAscii : PlyForm::kBinary);
   WriteKnownRotationInput(folder, orientations, positions, input.camera);
-  WriteMaps(folder, input.sequence(), orientations, positions, tracked.options.rotodom.features);
+  FeatureOptions features = tracked.options.rotodom.features;
+  features.num_levels += tracked.working.NumLevelsBelow(features.scale_factor);
+  WriteCameraYaml(folder / "camera.yaml", positions.camera, positions.lens_sigmas);
+  WriteMaps(folder, input.sequence(), orientations, positions, features);
   RunSummary summary = SummariseRun(tracked, positions);
   summary.seconds.push_back({"orientations", orientations_s});
   summary.seconds.push_back({"positions", positions_s});
@@ -131,20 +145,30 @@ int Run(const RunFlags& flags) {
   WriteSummary(folder / "summary.json", summary);
   tracked.outputs.Publish();
 
-  Warn(positions, *summary.segments, input, progress);
-  if (flags.use_report) WriteReportOfRun(tracked.directory, flags.track.common, progress);
+  Warn(tracked, positions, *summary.segments, progress);
+  for (const CheckReason& reason : CheckRun(tracked.directory).reasons) {
+    if (reason.warns) progress.Warn(reason.frames + ": " + reason.text);
+  }
+  if (flags.use_report) WriteReportOfRun(tracked.directory, flags.common, progress);
   tracked.checkpoint.Remove();
   progress.Say("wrote " + tracked.directory.string() +
                ": trajectory_tum.txt, trajectory_kitti.txt, keyframes_tum.txt, "
                "rotations_tum.txt, rotations.csv, loops.csv, cloud.ply, cameras.ply, segments.csv, "
-               "view_graph.g2o, "
-               "known_rotation.txt, map.bin, map_all_frames.bin, summary.json" +
+               "poses.csv, view_graph.g2o, known_rotation.txt, map.bin, map_all_frames.bin, "
+               "matches.bin, thumbnails.bin, camera.yaml, summary.json" +
                (flags.use_report ? ", report.html" : ""));
   if (positions.failure.empty()) {
     return tracked.interruption.IsRequested() ? Interruption::kExitCode : 0;
   }
   throw std::runtime_error("orientations are in " + tracked.directory.string() +
                            ", positions are not: " + positions.failure);
+}
+
+namespace {
+
+int Run(const RunFlags& flags) {
+  TrackedInput tracked("run", flags.track, RunOptionsOf(flags), true);
+  return FinishRun(tracked, {flags.ascii, flags.use_report, flags.track.common});
 }
 
 // Prints the options as they would be used, and ends the program.
@@ -168,11 +192,17 @@ void AddRunCommand(CLI::App& app, Action& action) {
   AddInputFlags(*command, flags->track.input);
   AddCheckpointFlags(*command, flags->track.checkpoint);
   AddKrotFlags(*command, flags->krot);
-  command->add_option(
+  auto* rotations = command->add_option(
       "--rotations",
       flags->track.input.rotations,
-      "Orientations from elsewhere (a gimbal, an IMU, another SLAM), camera->world: "
-      "a TUM file or a rotations.csv; the images then give tracks and positions");
+      "Orientations from elsewhere (a gimbal, an IMU, another SLAM), camera->world: a TUM file or "
+      "a rotations.csv. They count as much as they agree with the images, which fill their gaps");
+  command
+      ->add_flag("--align",
+                 flags->track.input.align,
+                 "Take out their offset in time and the rotation between their axes and the "
+                 "camera's, both estimated from the images")
+      ->needs(rotations);
   command->add_flag("--ascii", flags->ascii, "Write the PLY files as text");
   AddReportFlag(*command, flags->use_report);
   AddCommonFlags(*command, flags->track.common);

@@ -25,12 +25,9 @@ void AddInputFlags(CLI::App& command, InputFlags& flags) {
   command.add_option("--camera",
                      flags.camera,
                      "Calibration, of several cameras FILE:NAME: " + CameraFormNames() +
-                         "; not needed where it lies with the images");
-  command
-      .add_flag("--focal-guess",
-                flags.focal_guess,
-                "Do without a calibration: focal length from EXIF data or 1.2 x the longer side, "
-                "refined in a first pass over the beginning; less accurate")
+                         ". Without one, what lies with the images is taken, else the lens is "
+                         "estimated from the images; `none`: estimated in any case");
+  command.add_flag("--focal-guess", flags.focal_guess, "The same as --camera none")
       ->excludes("--camera");
   command.add_option("--out", flags.out, "Folder for the results, made if it is not there")
       ->required();
@@ -44,6 +41,18 @@ void AddInputFlags(CLI::App& command, InputFlags& flags) {
   command.add_option("--vocabulary",
                      flags.vocabulary,
                      "Visual words for that: our own file or ORB-SLAM's ORBvoc.txt; not needed");
+  command.add_option("--mask",
+                     flags.mask,
+                     "Image of the frames' size, black where all frames are to be ignored (a "
+                     "display, a bonnet)");
+  command.add_option("--masks",
+                     flags.masks,
+                     "Folder of such images, one per frame, by name: 0001.jpg.png, as COLMAP has "
+                     "it, or 0001.png (people, the sky)");
+  command.add_flag("--auto-mask,!--no-auto-mask",
+                   flags.auto_mask,
+                   "Find and ignore what never moves on the picture: text, drops, dirt, a border "
+                   "(the default)");
   command.add_option("--fps", flags.fps, "Frames per second where the input has no timestamps");
 }
 

@@ -4,6 +4,7 @@
 #include <array>
 #include <cstdio>
 
+#include "apps/cli/terminal/describe.h"
 #include "rotodom/types/median.h"
 
 namespace rotslam {
@@ -59,8 +60,13 @@ std::vector<std::string> DescribeSequence(const Sequence& sequence) {
 }
 
 std::vector<std::string> DescribeCamera(const Input& input) {
+  if (input.guess) {
+    return {"camera: no calibration: the lens is estimated from the images, starting from f = " +
+            Number("%.1f px", input.guess->focal_px) +
+            (input.guess->is_from_exif ? " (EXIF data)" : "")};
+  }
   std::vector<std::string> lines = {"camera: " + Describe(input.camera) + " (" +
-                                    (input.guess ? "guessed" : input.camera_source) + ")"};
+                                    input.camera_source + ")"};
   for (const std::string& note : input.camera_notes) lines.push_back("note:   " + note);
   // A calibration that names no side means the top, which a phone held upright has elsewhere.
   const auto& side = input.sequence().readout_from();
@@ -71,6 +77,18 @@ std::vector<std::string> DescribeCamera(const Input& input) {
                     Name(camera.readout_from) +
                     ", but the first row that the sensor stored is shown at the " + Name(*side) +
                     ": `readout_from: " + Name(*side) + "` is likely right");
+  }
+  return lines;
+}
+
+std::vector<std::string> DescribeMasks(const FrameMasks& masks) {
+  std::vector<std::string> lines;
+  if (!masks.common().IsEmpty()) {
+    lines.push_back("masks:  " + PercentText(masks.common().Share()) +
+                    " of the picture is ignored in all frames");
+  }
+  if (!masks.folder().empty()) {
+    lines.push_back("masks:  one per frame, from " + masks.folder().string());
   }
   return lines;
 }

@@ -14,6 +14,9 @@ std::vector<std::string> DescribeSequence(const Sequence& sequence);
 /// The same for the camera of an input: model, numbers, where they come from.
 std::vector<std::string> DescribeCamera(const Input& input);
 
+/// The same for its masks; none where nothing is masked.
+std::vector<std::string> DescribeMasks(const FrameMasks& masks);
+
 /// One line about times: from when to when, the rate, duplicates and gaps.
 /// @param times_s    ascending; empty: an empty line.
 /// @param with_gaps  off where the notes of a sequence tell of them.

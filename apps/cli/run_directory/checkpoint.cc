@@ -23,7 +23,7 @@ namespace {
 namespace fs = std::filesystem;
 
 // Changes with what is written.
-constexpr std::string_view kMagic = "rotslam checkpoint 5\n";
+constexpr std::string_view kMagic = "rotslam checkpoint 8\n";
 
 std::string Hex(std::uint64_t number) {
   std::array<char, 17> text = {};
@@ -80,6 +80,12 @@ std::string DescribeVocabulary(const std::string& path) {
   return file.filename().string() + ", " + std::to_string(fs::file_size(file, error)) + " bytes";
 }
 
+std::string DescribeMasksOf(const Input& input) {
+  Mask common = input.masks.common();
+  return ChecksumOf(common) + (input.masks.folder().empty() ? "" : ", ") +
+         input.masks.folder().string() + (input.find_static_content ? "" : ", no automatic one");
+}
+
 std::string ReadAll(const fs::path& file) {
   std::ifstream stream(file, std::ios::binary);
   return {std::istreambuf_iterator<char>(stream), std::istreambuf_iterator<char>()};
@@ -132,7 +138,9 @@ RunIdentity IdentityOf(const std::string& command,
       {"the sequence", DescribeImages(input.sequence())},
       {"the camera", DescribeCamera(input.camera)},
       {"the vocabulary", DescribeVocabulary(flags.vocabulary)},
+      {"the mask", DescribeMasksOf(input)},
       {"the seed", std::to_string(seed)},
+      {"max_image_side_px", std::to_string(options.max_image_side_px)},
   };
   const auto add = [&](const std::string& name, const auto& part) {
     for (const OptionEntry& option : DescribeOptions(part)) {
@@ -188,7 +196,7 @@ void Checkpoint::Open(const RunIdentity& identity) {
   try {
     ArchiveReader archive(body);
     archive(identity_then, committed_.num_records, committed_.num_bytes, committed_.checksum);
-    archive(state_, readout_);
+    archive(state_, found_);
     archive.ExpectEnd();
   } catch (const std::runtime_error& error) {
     Refuse(file.string() + ": " + error.what());
@@ -233,19 +241,19 @@ std::optional<RecordedFrame> Checkpoint::NextRecorded() {
   return std::nullopt;
 }
 
-void Checkpoint::Restore(LoopedOdometry& odometry) const {
+void Checkpoint::Restore(const std::function<void(const TrackingState&)>& restore) const {
   try {
-    odometry.RestoreState(state_);
+    restore(state_);
   } catch (const std::runtime_error& error) {
     Refuse((folder_ / "state.bin").string() + ": the odometry's state " + error.what());
   }
 }
 
-void Checkpoint::StartOver(const ReadoutEstimate& readout) {
+void Checkpoint::StartOver(const FoundInImages& found) {
   reader_.reset();
   Remove();
   committed_ = {};
-  readout_ = readout;
+  found_ = found;
   if (every_ > 0) StartWriting();
 }
 
@@ -274,13 +282,13 @@ bool Checkpoint::IsDue() const {
                        committed_.num_records + static_cast<std::uint64_t>(every_);
 }
 
-void Checkpoint::Commit(std::string state) {
+void Checkpoint::Commit(TrackingState state) {
   if (!IsOn() || writer_->extent().num_records == committed_.num_records) return;
   try {
     writer_->Sync();
     JournalExtent extent = writer_->extent();
     ArchiveWriter body;
-    body(identity_, extent.num_records, extent.num_bytes, extent.checksum, state, readout_);
+    body(identity_, extent.num_records, extent.num_bytes, extent.checksum, state, found_);
     const std::string bytes = body.TakeBytes();
     ArchiveWriter checksum;
     std::uint64_t sum = Checksum(bytes);

@@ -2,6 +2,7 @@
 
 #include <cstdint>
 #include <filesystem>
+#include <functional>
 #include <memory>
 #include <optional>
 #include <string>
@@ -11,7 +12,7 @@
 #include "apps/cli/input/input.h"
 #include "apps/cli/input/run_options.h"
 #include "apps/cli/terminal/progress.h"
-#include "apps/slam/frame_log.h"
+#include "apps/slam/input/frame_log.h"
 #include "output/files/journal.h"
 
 namespace rotslam {
@@ -54,13 +55,13 @@ class Checkpoint : public FrameLog {
   Checkpoint& operator=(const Checkpoint&) = delete;
 
   std::optional<RecordedFrame> NextRecorded() override;
-  void Restore(LoopedOdometry& odometry) const override;
-  const std::optional<ReadoutEstimate>& readout() const override { return readout_; }
-  void StartOver(const ReadoutEstimate& readout) override;
+  void Restore(const std::function<void(const TrackingState&)>& restore) const override;
+  const FoundInImages& found() const override { return found_; }
+  void StartOver(const FoundInImages& found) override;
   bool IsOn() const override { return writer_ != nullptr; }
   void Append(RecordedFrame& frame) override;
   bool IsDue() const override;
-  void Commit(std::string state) override;
+  void Commit(TrackingState state) override;
 
   /// The run is complete.
   void Remove();
@@ -76,8 +77,8 @@ class Checkpoint : public FrameLog {
   RunIdentity identity_;
   Progress& progress_;
   JournalExtent committed_;
-  std::string state_;
-  std::optional<ReadoutEstimate> readout_;
+  TrackingState state_;
+  FoundInImages found_;
   std::unique_ptr<JournalReader> reader_;  // null: nothing to read
   std::unique_ptr<JournalWriter> writer_;  // null: no checkpoints
 };

@@ -1,11 +1,16 @@
 #include "apps/cli/run_directory/map_files.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <map>
+#include <utility>
+#include <vector>
 
 #include "output/map/map_keypoints.h"
 #include "output/map/run_map.h"
+#include "output/map/thumbnails_file.h"
+#include "output/map/view_graph_matches.h"
 
 namespace rotslam {
 namespace {
@@ -94,6 +99,53 @@ void SetTracks(const std::map<FrameId, Features>& features,
   GuessUnknownLevels(map);
 }
 
+// The verified matches of the view-graph's edges.
+ViewGraphMatches MatchesOf(const Orientations& orientations) {
+  ViewGraphMatches result;
+  std::map<std::pair<FrameId, FrameId>, const EdgeMatches*> of_pair;  // the last ones of each
+  for (const EdgeMatches& matches : orientations.edge_matches) {
+    if (orientations.graph.FindEdge(matches.frame_i, matches.frame_j) == nullptr) continue;
+    of_pair[std::minmax(matches.frame_i, matches.frame_j)] = &matches;
+  }
+  // Positions, among the keypoints that matches name, of each frame's features; negative for the
+  // others.
+  std::map<FrameId, std::vector<int>> position;
+  const auto positions_of = [&](FrameId frame) -> std::vector<int>& {
+    std::vector<int>& of_frame = position[frame];
+    if (of_frame.empty()) of_frame.assign(orientations.features.at(frame).keypoints_px.size(), -1);
+    return of_frame;
+  };
+  for (const auto& [pair, matches] : of_pair) {
+    std::vector<int>& of_i = positions_of(matches->frame_i);
+    std::vector<int>& of_j = positions_of(matches->frame_j);
+    for (const auto& [at_i, at_j] : matches->pairs) of_i[at_i] = of_j[at_j] = 0;
+  }
+  for (auto& [frame, of_frame] : position) {
+    const Features& features = orientations.features.at(frame);
+    std::vector<Eigen::Vector2f>& keypoints_px = result.keypoints_px[frame];
+    for (std::size_t feature = 0; feature < of_frame.size(); ++feature) {
+      if (of_frame[feature] < 0) continue;
+      of_frame[feature] = static_cast<int>(keypoints_px.size());
+      keypoints_px.emplace_back(features.keypoints_px[feature].cast<float>());
+    }
+  }
+  for (const auto& [pair, matches] : of_pair) {
+    const bool is_flipped = pair.first != matches->frame_i;
+    const std::vector<int>& of_i = position.at(matches->frame_i);
+    const std::vector<int>& of_j = position.at(matches->frame_j);
+    MatchedPair& matched = result.pairs.emplace_back();
+    matched.i = pair.first;
+    matched.j = pair.second;
+    matched.matches.reserve(matches->pairs.size());
+    for (const auto& [at_i, at_j] : matches->pairs) {
+      matched.matches.push_back(is_flipped ? std::array{of_j[at_j], of_i[at_i]}
+                                           : std::array{of_i[at_i], of_j[at_j]});
+    }
+  }
+  std::erase_if(result.pairs, [](const MatchedPair& pair) { return pair.matches.empty(); });
+  return result;
+}
+
 }  // namespace
 
 void WriteMaps(const std::filesystem::path& directory,
@@ -126,6 +178,9 @@ void WriteMaps(const std::filesystem::path& directory,
   WriteRunMap(directory / "map.bin", map);
   SetTracks(orientations.features, positions.cloud.tracks, JoinTracks({}, positions.cloud), map);
   WriteRunMap(directory / "map_all_frames.bin", map);
+  WriteThumbnails(directory / "thumbnails.bin",
+                  {kThumbnailWidth, kThumbnailHeight, orientations.thumbnails});
+  WriteViewGraphMatches(directory / "matches.bin", MatchesOf(orientations));
 }
 
 }  // namespace rotslam

@@ -8,8 +8,9 @@
 
 namespace rotslam {
 
-/// Writes map.bin, the keyframes' map with all their tracks, and map_all_frames.bin, the cloud as
-/// all frames see it: what `rotslam export` reads.
+/// Writes what `rotslam export` reads: map.bin, the keyframes' map with all their tracks,
+/// map_all_frames.bin, the cloud as all frames see it, matches.bin, the verified matches of the
+/// view-graph, and thumbnails.bin, what the frames looked like.
 /// @param features  with which the orientations were found.
 void WriteMaps(const std::filesystem::path& directory,
                const Sequence& sequence,

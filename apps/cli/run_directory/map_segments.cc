@@ -2,33 +2,35 @@
 
 #include <algorithm>
 #include <iterator>
-#include <set>
+#include <utility>
+
+#include "output/tables/poses_csv.h"
 
 namespace rotslam {
 namespace {
 
-// The component that a frame's position belongs to: that of the keyframe at or before it.
-int ComponentAt(const std::vector<MapComponent>& components, int frame) {
-  int found = components.empty() ? -1 : 0;
-  for (int k = 0; k < static_cast<int>(components.size()); ++k) {
-    if (components[k].keyframes.begin()->value <= frame) found = k;
-  }
-  return found;
-}
-
-// The pure-rotation segment that holds a frame (-1: none), and how the camera moves at the frame.
+// The pure-rotation segment that holds a frame (-1: none), how the camera moves at the frame, and
+// the component of the map that it belongs to; within a pure rotation that of its first frame.
 struct FrameMotion {
   int pure_rotation = -1;
   const char* kind = "translating";
+  int component = -1;
 
   bool operator==(const FrameMotion& other) const = default;
 };
 
 std::vector<FrameMotion> MotionOfFrames(const MapResult& positions) {
   std::vector<FrameMotion> motions(positions.cam_from_world.size());
+  for (const auto& [frame, pose] : positions.frame_poses) {
+    motions[frame.value].component = pose.component;
+    if (pose.state == PoseState::kUnplaced) motions[frame.value].kind = "unplaced";
+  }
   for (int k = 0; k < std::ssize(positions.segments); ++k) {
     const PureRotationSegment& segment = positions.segments[k];
-    for (int n = segment.first.value; n <= segment.last.value; ++n) motions[n] = {k, "rotating"};
+    const int component = motions[segment.first.value].component;
+    for (int n = segment.first.value; n <= segment.last.value; ++n) {
+      motions[n] = {k, "rotating", component};
+    }
     for (const FrameRange& still : segment.still) {
       for (int n = still.first.value; n <= still.last.value; ++n) motions[n].kind = "still";
     }
@@ -55,21 +57,15 @@ std::string ScaleOf(const MapResult& positions, int component, int first_frame) 
 
 std::vector<Segment> SegmentsOf(const MapResult& positions) {
   const std::vector<FrameMotion> motions = MotionOfFrames(positions);
-  std::set<int> component_starts;
-  for (const MapComponent& component : positions.components) {
-    component_starts.insert(component.keyframes.begin()->value);
-  }
   std::vector<Segment> segments;
   for (int n = 0; n < std::ssize(motions); ++n) {
-    const bool begins = n == 0 || motions[n] != motions[n - 1] ||
-                        (motions[n].pure_rotation < 0 && component_starts.contains(n));
-    if (begins) {
+    if (n == 0 || motions[n] != motions[n - 1]) {
       Segment& segment = segments.emplace_back();
       segment.first_frame = n;
       segment.kind = motions[n].kind;
       const int pure_rotation = motions[n].pure_rotation;
       segment.evidence = pure_rotation < 0 ? 0.0 : positions.segments[pure_rotation].evidence;
-      segment.component = ComponentAt(positions.components, n);
+      segment.component = motions[n].component;
       segment.scale = ScaleOf(positions, segment.component, n);
     }
     segments.back().last_frame = n;
@@ -86,6 +82,32 @@ std::vector<std::string> CommentsOn(const std::vector<Segment>& segments) {
         std::to_string(segment.last_frame) + ": " + segment.kind + " on part " +
         std::to_string(segment.component) +
         " of the map, whose scale nothing measures; things stay as far away as before it");
+  }
+  return comments;
+}
+
+std::vector<std::string> CommentsOn(const std::map<FrameId, FramePose>& poses) {
+  // A note's figures are the frame's own; poses.csv has them.
+  const auto reason_of = [](const FramePose& pose) {
+    const std::string note = pose.note.substr(0, pose.note.find(':'));
+    return std::string(Name(pose.state)) + (note.empty() ? "" : ", " + note);
+  };
+  std::vector<std::string> comments;
+  for (auto first = poses.begin(); first != poses.end();) {
+    auto end = std::next(first);
+    auto last = first;
+    while (end != poses.end() && end->second.state == first->second.state &&
+           reason_of(end->second) == reason_of(first->second)) {
+      last = end++;
+    }
+    if (first->second.state != PoseState::kMeasured) {
+      const std::string number = std::to_string(first->first.value);
+      const std::string frames =
+          last == first ? "frame " + number
+                        : "frames " + number + " to " + std::to_string(last->first.value);
+      comments.push_back(frames + ": " + reason_of(first->second));
+    }
+    first = end;
   }
   return comments;
 }

@@ -6,6 +6,7 @@
 #include "output/tables/loops_csv.h"
 #include "output/tables/rotations_csv.h"
 #include "output/trajectory/trajectory.h"
+#include "rotodom/averaging/closure.h"
 
 namespace rotslam {
 namespace {
@@ -21,8 +22,17 @@ Trajectory RotationTrajectory(const Orientations& orientations) {
   return trajectory;
 }
 
+// Flags that say where an orientation comes from.
+void AddSource(const Orientations& orientations, FrameId frame, std::vector<std::string>& flags) {
+  const bool is_given = orientations.given && orientations.given->CountsFor(frame);
+  const bool is_matched = !orientations.graph.EdgesOf(frame).empty();
+  if (orientations.given && is_matched) flags.emplace_back("images");
+  if (is_given) flags.emplace_back("given");
+  if (!is_given && !is_matched) flags.emplace_back("predicted");
+}
+
 // The lines of rotations.csv, see docs/formats.md.
-std::vector<RotationRow> RotationRows(const Orientations& orientations) {
+std::vector<RotationRow> RotationRows(const Orientations& orientations, double closure_variance) {
   std::vector<RotationRow> rows;
   rows.reserve(orientations.cam_from_world.size());
   for (const auto& [frame, cam_from_world] : orientations.cam_from_world) {
@@ -33,14 +43,12 @@ std::vector<RotationRow> RotationRows(const Orientations& orientations) {
     row.inlier_edges = orientations.inlier_edges.at(frame);
     if (const auto known = orientations.covariance.find(frame);
         known != orientations.covariance.end()) {
-      row.sigma_deg = known->second.diagonal().cwiseSqrt() * kDegFromRad;
+      // With given orientations they contain it already.
+      const double variance = orientations.given ? 1.0 : closure_variance;
+      row.sigma_deg = (variance * known->second.diagonal()).cwiseSqrt() * kDegFromRad;
     }
     const FrameReport& report = orientations.reports[frame.value];
-    if (orientations.given) {
-      row.flags.emplace_back("given");
-    } else if (orientations.graph.EdgesOf(frame).empty()) {
-      row.flags.emplace_back("predicted");
-    }
+    AddSource(orientations, frame, row.flags);
     if (report.weak) row.flags.emplace_back("weak");
     if (report.searched_wide) row.flags.emplace_back("searched_wide");
     if (std::binary_search(orientations.breaks.begin(), orientations.breaks.end(), frame)) {
@@ -74,13 +82,33 @@ std::vector<LoopRow> LoopRows(const Orientations& orientations) {
   return rows;
 }
 
+// The view-graph with the covariances that its edges' errors have.
+ViewGraph WithErrors(const ViewGraph& graph, double variance) {
+  ViewGraph with_errors;
+  for (RelativeRotation edge : graph.edges()) {
+    edge.covariance *= variance;
+    with_errors.AddEdge(edge);
+  }
+  return with_errors;
+}
+
 }  // namespace
 
-void WriteOrientations(const std::filesystem::path& directory, const Orientations& orientations) {
+void WriteOrientations(const std::filesystem::path& directory,
+                       const Orientations& orientations,
+                       const AveragingOptions& averaging) {
+  const double closure_variance = ClosureVariance(orientations.graph);
+  const double edge_variance =
+      averaging.edge_error_factor * averaging.edge_error_factor * closure_variance;
   WriteTumTrajectory(directory / "rotations_tum.txt", RotationTrajectory(orientations));
-  WriteRotationsCsv(directory / "rotations.csv", RotationRows(orientations));
+  WriteRotationsCsv(directory / "rotations.csv", RotationRows(orientations, closure_variance));
   WriteLoopsCsv(directory / "loops.csv", LoopRows(orientations));
-  WriteG2o(directory / "view_graph.g2o", {orientations.graph, orientations.cam_from_world, {}});
+  WriteG2o(directory / "view_graph.g2o",
+           {WithErrors(orientations.graph, edge_variance), orientations.cam_from_world, {}});
+}
+
+void WriteCommonMask(const std::filesystem::path& directory, const FrameMasks& masks) {
+  if (!masks.common().IsEmpty()) WriteMask(directory / "mask.png", masks.common());
 }
 
 }  // namespace rotslam

@@ -1,8 +1,11 @@
 #include "apps/cli/run_directory/position_files.h"
 
+#include <utility>
+
 #include "apps/cli/run_directory/map_segments.h"
 #include "output/export/known_rotation_file.h"
 #include "output/tables/pose_covariance_csv.h"
+#include "output/tables/poses_csv.h"
 #include "output/trajectory/trajectory.h"
 
 namespace rotslam {
@@ -19,6 +22,24 @@ Trajectory MakeTrajectory(const std::vector<double>& timestamps_s,
   return trajectory;
 }
 
+std::vector<PoseRow> PoseRows(const Orientations& orientations, const MapResult& positions) {
+  std::vector<PoseRow> rows;
+  rows.reserve(positions.center_in_world.size());
+  for (const auto& [frame, center] : positions.center_in_world) {
+    PoseRow& row = rows.emplace_back();
+    row.frame = frame.value;
+    row.pose = {orientations.timestamps_s[frame.value],
+                positions.cam_from_world.at(frame).Inverse(),
+                center};
+    const FramePose& pose = positions.frame_poses.at(frame);
+    row.sigma = pose.position_sigma;
+    row.state = pose.state;
+    row.component = pose.component;
+    row.note = pose.note;
+  }
+  return rows;
+}
+
 }  // namespace
 
 void WritePositions(const std::filesystem::path& directory,
@@ -29,7 +50,12 @@ void WritePositions(const std::filesystem::path& directory,
       orientations.timestamps_s, positions.cam_from_world, positions.center_in_world);
   const std::vector<Segment> segments = SegmentsOf(positions);
   const std::vector<std::string> comments = CommentsOn(segments);
-  WriteTumTrajectory(directory / "trajectory_tum.txt", trajectory, comments);
+  std::vector<std::string> all_comments = comments;
+  for (std::string& comment : CommentsOn(positions.frame_poses)) {
+    all_comments.push_back(std::move(comment));
+  }
+  WriteTumTrajectory(directory / "trajectory_tum.txt", trajectory, all_comments);
+  WritePosesCsv(directory / "poses.csv", PoseRows(orientations, positions));
   WriteKittiTrajectory(directory / "trajectory_kitti.txt", trajectory);
   CenterMap keyframe_centers = positions.center_in_world;
   std::erase_if(keyframe_centers,

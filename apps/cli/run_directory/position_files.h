@@ -9,7 +9,7 @@
 namespace rotslam {
 
 /// Writes trajectory_tum.txt, trajectory_kitti.txt, keyframes_tum.txt, cloud.ply, cameras.ply,
-/// segments.csv and, where there are covariances, pose_covariance.csv.
+/// segments.csv, poses.csv and, where there are covariances, pose_covariance.csv.
 void WritePositions(const std::filesystem::path& directory,
                     const Orientations& orientations,
                     const MapResult& positions,

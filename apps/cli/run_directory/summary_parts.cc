@@ -1,18 +1,67 @@
 #include "apps/cli/run_directory/summary_parts.h"
 
 #include <algorithm>
+#include <array>
+#include <filesystem>
 #include <functional>
 #include <map>
+#include <string>
 #include <utility>
 
-#include "apps/cli/input/focal_guess.h"
+#include "apps/cli/input/lens_guess.h"
 #include "apps/cli/run_directory/map_segments.h"
+#include "output/tables/poses_csv.h"
 
 namespace rotslam {
 namespace {
 
 SummaryTable SummaryOf(const ReadoutEstimate& readout) {
   return {{"source", "images"}, {"readout_s", readout.readout_s}, {"sigma_s", readout.sigma_s}};
+}
+
+const char* NameOf(StaticContentKind kind) {
+  switch (kind) {
+    case StaticContentKind::kNone:
+      return "none";
+    case StaticContentKind::kOnPicture:
+      return "on_picture";
+    case StaticContentKind::kStanding:
+      return "standing_camera";
+    case StaticContentKind::kUndecided:
+      return "undecided";
+  }
+  return "";
+}
+
+std::optional<SummaryTable> MasksOf(const Orientations& orientations) {
+  const StaticContent& found = orientations.static_content;
+  const FrameMasks& masks = orientations.masks;
+  if (masks.IsEmpty() && found.kind == StaticContentKind::kNone) return std::nullopt;
+  SummaryTable table = {{"share", masks.common().Share()},
+                        {"static_content", std::string(NameOf(found.kind))},
+                        {"static_share", found.mask.Share()}};
+  if (!masks.common().IsEmpty()) table.emplace_back("file", std::string("mask.png"));
+  if (!masks.folder().empty()) {
+    table.emplace_back("folder", std::filesystem::absolute(masks.folder()).string());
+  }
+  return table;
+}
+
+// What the images say against the calibration; nullopt: nothing.
+std::optional<SummaryTable> LensChecksOf(const Orientations& orientations) {
+  const std::vector<Zoom>& zooms = orientations.zooms;
+  if (zooms.empty() && !orientations.fisheye.IsFisheye()) return std::nullopt;
+  SummaryTable table = {{"is_fisheye", orientations.fisheye.IsFisheye()},
+                        {"zooms", static_cast<std::int64_t>(zooms.size())}};
+  if (!zooms.empty()) {
+    double factor = 1.0;
+    for (const Zoom& zoom : zooms) factor *= zoom.factor;
+    table.insert(table.end(),
+                 {{"zoom.first_frame", std::int64_t{zooms.front().first.value}},
+                  {"zoom.last_frame", std::int64_t{zooms.back().last.value}},
+                  {"zoom.factor", factor}});
+  }
+  return table;
 }
 
 template <class Container>
@@ -63,25 +112,29 @@ SummaryTable SecondsOf(const Orientations& orientations) {
 }
 
 // The lens as bundle adjustment has refined it, and how certain it is.
-void AddLens(const BundleSummary& bundle, const Camera& camera, SummaryTable& table) {
-  const bool is_fov = camera.model == CameraModel::kFov;
+void AddLens(const BundleSummary& bundle,
+             const Camera& camera,
+             const LensSigmas& sigmas,
+             SummaryTable& table) {
   table.insert(table.end(),
                {{"lens.gain", bundle.lens_gain},
                 {"lens.refined", bundle.lens_refined},
+                {"lens.model", Name(camera.model)},
                 {"lens.fx", camera.fx},
                 {"lens.fy", camera.fy},
-                {is_fov ? "lens.w" : "lens.k1", camera.distortion[0]}});
-  if (!is_fov) table.emplace_back("lens.k2", camera.distortion[1]);
-  if (!bundle.lens_sigmas) return;
-  const LensSigmas& sigmas = *bundle.lens_sigmas;
+                {"lens.cx", camera.cx},
+                {"lens.cy", camera.cy}});
+  const auto names = DistortionNames(camera.model);
+  for (std::size_t k = 0; k < names.size(); ++k) {
+    table.emplace_back(std::string("lens.") + names[k], camera.distortion[k]);
+  }
   table.insert(table.end(),
-               {{"lens.cx", camera.cx},
-                {"lens.cy", camera.cy},
-                {"lens.sigma_focal_px", sigmas.focal_px},
+               {{"lens.sigma_focal_px", sigmas.focal_px},
                 {"lens.sigma_cx_px", sigmas.cx_px},
-                {"lens.sigma_cy_px", sigmas.cy_px},
-                {is_fov ? "lens.sigma_w" : "lens.sigma_k1", sigmas.k1}});
-  if (!is_fov) table.emplace_back("lens.sigma_k2", sigmas.k2);
+                {"lens.sigma_cy_px", sigmas.cy_px}});
+  for (std::size_t k = 0; k < std::min(names.size(), sigmas.distortion.size()); ++k) {
+    table.emplace_back(std::string("lens.sigma_") + names[k], sigmas.distortion[k]);
+  }
 }
 
 // Iterations of every stage to `table`, their times to `seconds`.
@@ -108,6 +161,52 @@ void AddStages(const std::vector<BundleSummary>& bundles,
   seconds.emplace_back("bundle_adjustment", bundle_seconds);
 }
 
+void Set(const std::string& key, SummaryValue value, SummaryTable& table) {
+  const auto entry = std::find_if(
+      table.begin(), table.end(), [&](const auto& other) { return other.first == key; });
+  if (entry == table.end()) {
+    table.emplace_back(key, std::move(value));
+  } else {
+    entry->second = std::move(value);
+  }
+}
+
+// How a sensor lies in time and on the camera; in place of what the table says of it.
+void SetAlignment(const SensorAlignment& alignment, SummaryTable& table) {
+  const Eigen::Vector3d mounting_deg = alignment.cam_from_sensor.Log() * kDegFromRad;
+  const Eigen::Vector3d sigma_deg =
+      alignment.mounting_covariance.diagonal().cwiseSqrt() * kDegFromRad;
+  Set("given.offset_s", alignment.offset_s, table);
+  Set("given.offset_sigma_s", alignment.offset_sigma_s, table);
+  Set("given.has_offset", alignment.has_offset, table);
+  constexpr std::array kAxes = {"x", "y", "z"};
+  for (int axis = 0; axis < 3; ++axis) {
+    const std::string name = kAxes[axis];
+    Set("given.mounting_" + name + "_deg", mounting_deg[axis], table);
+    Set("given.mounting_sigma_" + name + "_deg", sigma_deg[axis], table);
+  }
+  Set("given.has_mounting", alignment.has_mounting, table);
+}
+
+// What the images tell of given orientations.
+void AddGiven(const GivenRotations& given, SummaryTable& table) {
+  const SensorFusion& fusion = given.fusion;
+  std::map<OrientationSource, std::int64_t> num_frames;
+  for (const OrientationSource source : fusion.source) ++num_frames[source];
+  Set("given.aligned", given.is_aligned, table);
+  SetAlignment(fusion.alignment, table);
+  table.insert(table.end(),
+               {{"given.disagreement_deg", fusion.disagreement_rad * kDegFromRad},
+                {"given.aligned_disagreement_deg", fusion.aligned_disagreement_rad * kDegFromRad},
+                {"given.sigma_deg", fusion.sigma_rad * kDegFromRad},
+                {"given.drift_deg", fusion.drift_rad * kDegFromRad},
+                {"given.outliers", std::int64_t{fusion.num_outliers}},
+                {"given.frames_of_images", num_frames[OrientationSource::kImages]},
+                {"given.frames_of_both", num_frames[OrientationSource::kBoth]},
+                {"given.frames_given_only", num_frames[OrientationSource::kSensor]},
+                {"given.frames_interpolated", num_frames[OrientationSource::kNothing]}});
+}
+
 }  // namespace
 
 RunSummary StartSummary(const std::string& command,
@@ -121,8 +220,11 @@ RunSummary StartSummary(const std::string& command,
   summary.camera = input.camera;
   if (input.guess) summary.calibration = SummaryOf(*input.guess, input.camera);
   if (input.readout) summary.readout = SummaryOf(*input.readout);
+  summary.masks = MasksOf(orientations);
+  summary.lens_checks = LensChecksOf(orientations);
   summary.sequence = {{"description", input.sequence().Describe()},
                       {"path", input.path},
+                      {"working_scale", orientations.working_scale},
                       {"camera_file", input.camera_file},
                       {"first_timestamp_s", orientations.timestamps_s.front()},
                       {"last_timestamp_s", orientations.timestamps_s.back()}};
@@ -130,7 +232,7 @@ RunSummary StartSummary(const std::string& command,
   summary.rotodom = OdometryOf(orientations);
   if (orientations.given) {
     summary.sequence.emplace_back("rotations_file", orientations.given->file);
-    summary.rotodom->emplace_back("given_disagreement_deg", orientations.given->disagreement_deg);
+    AddGiven(*orientations.given, *summary.rotodom);
   }
   summary.seconds = SecondsOf(orientations);
   summary.loops = SummaryTable{{"places", std::int64_t{orientations.num_places}},
@@ -150,9 +252,24 @@ void AddPositions(const MapResult& positions, const Camera& camera, RunSummary& 
                          {"relocalised_keyframes", Count(positions.relocalised)},
                          {"resected_frames", std::int64_t{positions.num_resected}},
                          {"interpolated_frames", std::int64_t{positions.num_interpolated}}});
+  std::map<PoseState, std::int64_t> num_poses;
+  for (const auto& [frame, pose] : positions.frame_poses) ++num_poses[pose.state];
+  for (const auto& [state, number] : num_poses) {
+    summary.counts.emplace_back(std::string("poses.") + Name(state), number);
+  }
+  if (positions.sensor_alignment) SetAlignment(*positions.sensor_alignment, *summary.rotodom);
   summary.segments = SegmentsOf(positions);
+  if (const CalibrationCheck& check = positions.calibration_check; check.is_known) {
+    if (!summary.lens_checks) summary.lens_checks.emplace();
+    summary.lens_checks->insert(summary.lens_checks->end(),
+                                {{"focal.by_images_px", check.share * camera.fx},
+                                 {"focal.calibrated_px", camera.fx},
+                                 {"focal.sigma_px", check.sigma * camera.fx},
+                                 {"focal.contradicts", check.Contradicts()}});
+  }
   AddKnownRotation(positions.krot, camera, summary);
-  AddBundles(positions.bundles, positions.camera, summary);
+  AddFinalBracket(positions.final_bracket, positions.camera, summary);
+  AddBundles(positions, summary);
 }
 
 void AddKnownRotation(const KrotSolution& solution, const Camera& camera, RunSummary& summary) {
@@ -176,9 +293,21 @@ void AddKnownRotation(const KrotSolution& solution, const Camera& camera, RunSum
   summary.seconds.push_back({"known_rotation", solution.seconds});
 }
 
-void AddBundles(const std::vector<BundleSummary>& bundles,
-                const Camera& camera,
-                RunSummary& summary) {
+void AddFinalBracket(const MapBracket& bracket, const Camera& camera, RunSummary& summary) {
+  if (bracket.num_observations == 0) return;
+  const double focal_px = camera.MeanFocal();
+  summary.krot->more.insert(summary.krot->more.end(),
+                            {{"final.gamma_low_px", bracket.gamma_low * focal_px},
+                             {"final.gamma_high_px", bracket.gamma_high * focal_px},
+                             {"final.largest_residual_px", bracket.largest_residual * focal_px},
+                             {"final.observations", std::int64_t{bracket.num_observations}},
+                             {"final.tracks", std::int64_t{bracket.num_tracks}},
+                             {"final.programs", std::int64_t{bracket.num_programs}}});
+  summary.seconds.push_back({"final_bracket", bracket.seconds});
+}
+
+void AddBundles(const MapResult& positions, RunSummary& summary) {
+  const std::vector<BundleSummary>& bundles = positions.bundles;
   if (bundles.empty()) return;
 
   // Sums over the components.
@@ -210,7 +339,7 @@ void AddBundles(const std::vector<BundleSummary>& bundles,
                             {"median_error_px", largest.after.median_px},
                             {"p90_error_px", largest.after.p90_px},
                             {"has_motion_blur", largest.has_motion_blur}};
-  AddLens(largest, camera, *summary.ba);
+  AddLens(largest, positions.camera, positions.lens_sigmas, *summary.ba);
   AddStages(bundles, *summary.ba, summary.seconds);
 }
 

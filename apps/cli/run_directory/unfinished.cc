@@ -12,22 +12,31 @@ namespace fs = std::filesystem;
 
 constexpr const char* kSummary = "summary.json";
 
-// All that `run` and `rotations` write, but for the summary.
+// All that `run`, `rotations` and `solve` write, but for the summary.
 constexpr std::array kOutputs = {"cameras.ply",
+                                 "camera.yaml",
                                  "cloud.ply",
                                  "keyframes_tum.txt",
                                  "known_rotation.txt",
+                                 "live_trajectory_tum.txt",
                                  "loops.csv",
                                  "map.bin",
                                  "map_all_frames.bin",
+                                 "matches.bin",
+                                 "mask.png",
                                  "pose_covariance.csv",
+                                 "poses.csv",
+                                 "removed.csv",
                                  "report.html",
+                                 "residuals.csv",
                                  "rotations.csv",
                                  "rotations_tum.txt",
                                  "segments.csv",
+                                 "thumbnails.bin",
                                  "trajectory_kitti.txt",
                                  "trajectory_tum.txt",
-                                 "view_graph.g2o"};
+                                 "view_graph.g2o",
+                                 "views.csv"};
 
 fs::path OutputsFolder(const fs::path& run) { return UnfinishedFolder(run) / "outputs"; }
 // The same once they are being moved.

@@ -46,4 +46,10 @@ std::string DescribeRounded(Camera camera) {
   return Describe(camera);
 }
 
+std::string PercentText(double share) {
+  std::array<char, 32> text = {};
+  std::snprintf(text.data(), text.size(), share < 0.0995 ? "%.1f %%" : "%.0f %%", 100.0 * share);
+  return text.data();
+}
+
 }  // namespace rotslam

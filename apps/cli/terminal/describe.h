@@ -9,6 +9,9 @@
 
 namespace rotslam {
 
+/// A share of 0 to 1 as "12 %", "0.4 %".
+std::string PercentText(double share);
+
 /// `20.3 +- 0.2 ms from the top`.
 std::string DescribeReadout(const ReadoutEstimate& readout);
 

@@ -206,7 +206,7 @@ std::vector<std::string> Progress::Figures() const {
   const double fps = done_ / seconds;
   std::vector<std::string> figures;
   figures.push_back(std::to_string(done_) + (total_ > 0 ? "/" + std::to_string(total_) : ""));
-  figures.push_back(Formatted("%.1f fps", fps));
+  figures.push_back(Formatted(fps < 100.0 ? "%.1f fps" : "%.0f fps", fps));
   if (total_ > 0) figures.push_back("ETA " + Duration(std::max(0, total_ - done_) / fps));
   figures.insert(figures.end(), counters_.begin(), counters_.end());
   return figures;

@@ -10,6 +10,8 @@
 #include "apps/cli/terminal/describe.h"
 #include "apps/slam/map_result.h"
 #include "apps/slam/orientations.h"
+#include "apps/slam/working_size/original_size.h"
+#include "rotodom/types/text_file.h"
 
 namespace rotslam {
 
@@ -150,6 +152,50 @@ void WarnOfRotationScale(const std::vector<LoopCheck>& loops, Progress& progress
 }
 
 // @param unreadable  frames that have had a warning of their own.
+std::string DegText(double rad) { return FormatNumber("%.2f", rad * kDegFromRad) + " deg"; }
+
+// Offset and mounting of given orientations, each with its deviation; empty where there is neither.
+std::string DescribeAlignment(const SensorAlignment& alignment) {
+  std::string text;
+  if (alignment.has_offset) {
+    text = FormatNumber("%.1f", 1e3 * std::abs(alignment.offset_s)) + " ms (+- " +
+           FormatNumber("%.1f", 1e3 * alignment.offset_sigma_s) + ") " +
+           (alignment.offset_s > 0.0 ? "late" : "early");
+  }
+  if (alignment.has_mounting) {
+    // Of the angle: along the axis turned about.
+    const Eigen::Vector3d turn = alignment.cam_from_sensor.Log();
+    const Eigen::Vector3d axis = turn.normalized();
+    const double sigma_rad = std::sqrt(axis.dot(alignment.mounting_covariance * axis));
+    text += (text.empty() ? "" : " and ") + ("turned by " + DegText(turn.norm())) + " (+- " +
+            FormatNumber("%.2f", sigma_rad * kDegFromRad) + ") against the camera";
+  }
+  return text;
+}
+
+void TellOfGiven(const GivenRotations& given, Progress& progress) {
+  const SensorFusion& fusion = given.fusion;
+  const std::string alignment = DescribeAlignment(fusion.alignment);
+  int num_frames = 0;
+  for (const OrientationSource source : fusion.source) {
+    num_frames +=
+        source == OrientationSource::kBoth || source == OrientationSource::kSensor ? 1 : 0;
+  }
+  const std::string worth = "they count with " + DegText(fusion.sigma_rad) + " and a drift of " +
+                            FormatNumber("%.3f", fusion.drift_rad * kDegFromRad) + " deg a frame";
+  const std::string what = "orientations from " + given.file + " for " +
+                           std::to_string(num_frames) + " of " +
+                           std::to_string(fusion.source.size()) + " frames";
+  if (alignment.empty()) {
+    progress.Say(what + ", in time and in the camera's axes: " + worth);
+  } else if (given.is_aligned) {
+    progress.Say(what + ", " + alignment + ", which is taken out: " + worth);
+  } else {
+    progress.Warn(what + " are " + alignment + ": as they stand " + worth +
+                  ", instead of correcting the images. --align takes that out");
+  }
+}
+
 void WarnOfInterpolatedFrames(const std::set<FrameId>& unconnected,
                               const std::set<FrameId>& unreadable,
                               Progress& progress) {
@@ -170,6 +216,31 @@ void WarnOfBreaks(const std::vector<FrameId>& breaks, Progress& progress) {
                   " matches none before it: the video has a cut there, or the view was lost. How "
                   "far the camera turned across this gap is a guess, and so is the direction of "
                   "everything after it. Split the video there and run the parts one by one");
+  }
+}
+
+// Warns of images of a fisheye lens whose calibration has another projection.
+void WarnOfFisheye(const Orientations& orientations, Progress& progress) {
+  const FisheyeCheck& check = orientations.fisheye;
+  if (!check.IsFisheye()) return;
+  const auto percent = [&](int count) {
+    return std::to_string(std::lround(100.0 * count / check.num_points)) + " %";
+  };
+  progress.Warn("the images look like those of a fisheye lens, but the calibration is a " +
+                std::string(Name(orientations.camera.model)) + " one: pairs of frames explain " +
+                percent(check.num_by_camera) + " of their points with it and " +
+                percent(check.num_by_fisheye) +
+                " with a fisheye. Rotations, path and map are wrong then: calibrate the camera as "
+                "`model: equidistant`");
+}
+
+void WarnOfZooms(const std::vector<Zoom>& zooms, Progress& progress) {
+  for (const Zoom& zoom : zooms) {
+    progress.Warn("frames " + std::to_string(zoom.first.value) + " to " +
+                  std::to_string(zoom.last.value) + ": the lens zooms, the focal length becomes " +
+                  FormatNumber("%.2f", zoom.factor) +
+                  " times as long. From there on orientations, path and map are less certain: film "
+                  "without zooming, or run the parts one by one with a calibration each");
   }
 }
 
@@ -215,11 +286,17 @@ std::string DescribeKeyframes(const MapResult& map) {
 }  // namespace
 
 SlamProgress::SlamProgress(const SlamOptions& options,
+                           const WorkingSize& working,
                            const Interruption& interruption,
                            Progress& progress)
-    : options_(options), interruption_(interruption), progress_(progress) {}
+    : options_(options), working_(working), interruption_(interruption), progress_(progress) {}
 
 SlamProgress::~SlamProgress() = default;
+
+std::vector<BundleSummary> SlamProgress::OriginalBundles(std::vector<BundleSummary> bundles) const {
+  for (BundleSummary& bundle : bundles) ToOriginalSize(working_, bundle);
+  return bundles;
+}
 
 void SlamProgress::OnBegin(SlamStage stage, int num_steps) {
   if (stage == SlamStage::kOrientations) {
@@ -250,6 +327,29 @@ void SlamProgress::OnReadoutFound(const ReadoutEstimate& readout) {
       CameraLines(readout) + ". Write that into the camera file, and later runs start only once");
 }
 
+void SlamProgress::OnStaticContent(const StaticContent& content) {
+  if (content.kind == StaticContentKind::kStanding) {
+    progress_.Warn(
+        "the camera stands, and things move in front of it: the result has one orientation, no "
+        "positions and no points. If the camera moved and what does not move is on the picture, "
+        "mask that with --mask FILE");
+    return;
+  }
+  progress_.EndStage("static content on the picture");
+  const std::string what =
+      PercentText(content.mask.Share()) + " of the picture never moves while the rest does";
+  if (content.kind == StaticContentKind::kUndecided) {
+    progress_.Warn(what +
+                   ". Either something lies on the picture (text, drops, dirt, a border): it is "
+                   "ignored, and the run starts again. Or the camera stands and things move in "
+                   "front of it: then the path is not real, and --no-auto-mask takes it back");
+    return;
+  }
+  progress_.Warn(what +
+                 " (text, drops, dirt, a border): it is ignored, and the run starts again from the "
+                 "first frame. --no-auto-mask keeps it");
+}
+
 void SlamProgress::OnMissingImage(const std::string& problem) {
   progress_.Warn(problem +
                  ": the image could be read before, and now it cannot. The map is finished without "
@@ -257,12 +357,19 @@ void SlamProgress::OnMissingImage(const std::string& problem) {
                  "their place until the run has ended");
 }
 
-void SlamProgress::OnFocalPass(int pass, double focal_px) {
-  std::array<char, 32> focal = {};
-  std::snprintf(focal.data(), focal.size(), "%.1f px", focal_px);
-  progress_.Say("pass " + std::to_string(pass) +
-                " over the first frames to estimate the focal length, starting from " +
-                focal.data() + (pass == 1 ? " (a guess)" : ""));
+void SlamProgress::OnLensRound(int round, const Camera& camera) {
+  if (round == 0) {
+    progress_.Say("lens: the first frames, to estimate it from the images");
+    return;
+  }
+  std::array<char, 64> text = {};
+  std::snprintf(text.data(),
+                text.size(),
+                "lens: round %d, from %s, f = %.1f px",
+                round,
+                Name(camera.model),
+                camera.MeanFocal() / working_.scale());
+  progress_.Say(text.data());
 }
 
 void SlamProgress::OnEnd(SlamStage /*stage*/, const Orientations& orientations) {
@@ -270,13 +377,15 @@ void SlamProgress::OnEnd(SlamStage /*stage*/, const Orientations& orientations) 
   if (!orientations.interrupted) WarnOfMissingFrames(num_frames, num_announced_, progress_);
   progress_.EndStage(std::to_string(num_frames) + " frames, " +
                      std::to_string(orientations.graph.edges().size()) + " edges");
+  std::set<FrameId> interpolated = orientations.unconnected;
   if (orientations.given) {
-    progress_.Say("orientations from " + orientations.given->file + ", " +
-                  std::to_string(orientations.given->disagreement_deg) +
-                  " deg from the edges (median)");
-  } else {
-    WarnOfInterpolatedFrames(orientations.unconnected, unreadable_, progress_);
+    TellOfGiven(*orientations.given, progress_);
+    std::erase_if(interpolated,
+                  [&](FrameId frame) { return orientations.given->CountsFor(frame); });
   }
+  WarnOfInterpolatedFrames(interpolated, unreadable_, progress_);
+  WarnOfFisheye(orientations, progress_);
+  WarnOfZooms(orientations.zooms, progress_);
   WarnOfRotationScale(orientations.loops, progress_);
   WarnOfBreaks(orientations.breaks, progress_);
 }
@@ -291,16 +400,22 @@ void SlamProgress::OnEnd(SlamStage stage, const MapResult& map) {
       break;
     case SlamStage::kBundleAdjustment:
       progress_.EndStage(std::to_string(map.map.point_in_world.size()) + " points, " +
-                         DescribeMeanError(map.bundles) + ", " + DescribeRounded(map.camera));
+                         DescribeMeanError(OriginalBundles(map.bundles)) + ", " +
+                         DescribeRounded(working_.Original(map.camera)));
       TellRelocalised(map.relocalised, progress_);
       break;
     case SlamStage::kPureRotation:
       progress_.EndStage("explains " + std::to_string(map.num_rotation_observations) +
-                         " observations, " + DescribeRounded(map.camera));
+                         " observations, " + DescribeRounded(working_.Original(map.camera)));
       break;
     case SlamStage::kFrameRegistration:
       progress_.EndStage(std::to_string(map.num_resected) + " resected, " +
                          std::to_string(map.num_interpolated) + " interpolated");
+      if (map.sensor_alignment) {
+        const std::string alignment = DescribeAlignment(*map.sensor_alignment);
+        progress_.Say("the given orientations against the map's: " +
+                      (alignment.empty() ? "in time and in the camera's axes" : alignment));
+      }
       break;
     case SlamStage::kCloud:
       TellCloud(map, options_.cloud_min_angle_deg, progress_);

@@ -3,26 +3,33 @@
 #include <memory>
 #include <set>
 #include <string>
+#include <vector>
 
 #include "apps/cli/terminal/interruption.h"
 #include "apps/cli/terminal/progress.h"
 #include "apps/slam/observer.h"
 #include "apps/slam/options.h"
+#include "apps/slam/working_size/working_size.h"
+#include "ba/bundle_adjustment.h"
 
 namespace rotslam {
 
 /// Writes the progress and the warnings of a run for a person. The constructor's arguments must
-/// outlive it.
+/// outlive it. It is told what is worked with, and says pixels of the original images.
 class SlamProgress : public SlamObserver {
  public:
-  SlamProgress(const SlamOptions& options, const Interruption& interruption, Progress& progress);
+  SlamProgress(const SlamOptions& options,
+               const WorkingSize& working,
+               const Interruption& interruption,
+               Progress& progress);
   ~SlamProgress() override;
 
   void OnBegin(SlamStage stage, int num_steps) override;
   void OnFrame(const FrameProgress& progress) override;
   void OnReadoutFound(const ReadoutEstimate& readout) override;
+  void OnStaticContent(const StaticContent& content) override;
   void OnMissingImage(const std::string& problem) override;
-  void OnFocalPass(int pass, double focal_px) override;
+  void OnLensRound(int round, const Camera& camera) override;
   void OnEnd(SlamStage stage, const Orientations& orientations) override;
   void OnEnd(SlamStage stage, const MapResult& map) override;
   bool ShouldStop() override;
@@ -30,7 +37,10 @@ class SlamProgress : public SlamObserver {
  private:
   class Counters;
 
+  std::vector<BundleSummary> OriginalBundles(std::vector<BundleSummary> bundles) const;
+
   const SlamOptions& options_;
+  const WorkingSize& working_;
   const Interruption& interruption_;
   Progress& progress_;
   std::unique_ptr<Counters> counters_;  // of the stage at hand

@@ -21,7 +21,7 @@ int main(int argc, char** argv) try {
                              size);
   rotslam::SlamOptions options;
   options.num_threads = 2;
-  const auto [focal_length, orientations, map] = rotslam::RunSlam(frames, camera, options);
+  const auto [lens, orientations, map] = rotslam::RunSlam(frames, camera, options);
   if (!map.failure.empty()) std::fprintf(stderr, "no map: %s\n", map.failure.c_str());
 
   rotslam::Trajectory trajectory;

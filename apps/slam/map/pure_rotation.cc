@@ -161,6 +161,7 @@ PureRotationResult RefineRotationAndLens(const Camera& camera,
   RotationMap rotations;
   for (const FrameId frame : frames) rotations[frame] = turn.at(frame);
   const std::vector<Track> seen = RestrictTracks(tracks, {frames.begin(), frames.end()}, 3);
+  options.lens.given_sigmas.reset();
   options.lens.refine_focal = true;
   options.lens.refine_principal_point = true;
   options.lens.refine_distortion = true;

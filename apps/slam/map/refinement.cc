@@ -54,7 +54,8 @@ std::size_t LargestComponent(const std::vector<MapComponent>& components,
 
 BundleOptions WithFixedLens(BundleOptions options) {
   options.lens.refine_focal = options.lens.refine_distortion = false;
-  options.lens.refine_principal_point = false;
+  options.lens.refine_principal_point = options.lens.refine_higher_terms = false;
+  options.lens.given_sigmas.reset();
   return options;
 }
 
@@ -68,6 +69,8 @@ BundleResult RefineComponent(const MapComponent& component,
   for (const FrameId frame : component.keyframes) {
     problem.start.cam_from_world[frame] = start.cam_from_world.at(frame);
     problem.start.center_in_world[frame] = start.center_in_world.at(frame);
+    const auto sigma_rad = start.rotation_sigma_rad.find(frame);
+    if (sigma_rad != start.rotation_sigma_rad.end()) problem.rotation_sigma_rad.insert(*sigma_rad);
   }
   for (const PureRotationSegment& segment : start.segments) {
     if (component.keyframes.contains(segment.first) && component.keyframes.contains(segment.last)) {
@@ -100,12 +103,15 @@ RefinedComponents RefineComponents(const RefinementStart& start,
   if (refined.components.empty()) return refined;
   const auto refine =
       [&](std::size_t k, const std::vector<Track>& seen, const BundleOptions& bundle_options) {
-        refined.bundles[k] =
-            RefineComponent(refined.components[k],
-                            {start.cam_from_world, start.center_in_world, seen, start.segments},
-                            refined.camera,
-                            bundle_options,
-                            complete);
+        refined.bundles[k] = RefineComponent(refined.components[k],
+                                             {start.cam_from_world,
+                                              start.center_in_world,
+                                              seen,
+                                              start.segments,
+                                              start.rotation_sigma_rad},
+                                             refined.camera,
+                                             bundle_options,
+                                             complete);
       };
   const std::size_t first = LargestComponent(refined.components, start.tracks);
   refine(first, start.tracks, options);
@@ -117,6 +123,24 @@ RefinedComponents RefineComponents(const RefinementStart& start,
     if (k != first) refine(k, seen, same_lens);
   }
   return refined;
+}
+
+MapBracket BracketComponents(const RefinedComponents& refined, const KrotOptions& options) {
+  MapBracket all;
+  all.status = BisectionStatus::kConverged;
+  for (const BundleResult& bundle : refined.bundles) {
+    if (!bundle.Usable()) continue;
+    const MapBracket one = BracketMap(bundle.reconstruction, bundle.camera, options);
+    if (one.status != BisectionStatus::kConverged) all.status = one.status;
+    all.largest_residual = std::max(all.largest_residual, one.largest_residual);
+    all.gamma_low = std::max(all.gamma_low, one.gamma_low);
+    all.gamma_high = std::max(all.gamma_high, one.gamma_high);
+    all.num_observations += one.num_observations;
+    all.num_tracks += one.num_tracks;
+    all.num_programs += one.num_programs;
+    all.seconds += one.seconds;
+  }
+  return all;
 }
 
 double MeanErrorPx(const std::vector<BundleSummary>& bundles) {

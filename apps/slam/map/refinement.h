@@ -8,6 +8,7 @@
 
 #include "ba/bundle_adjustment.h"
 #include "krot/known_rotation.h"
+#include "krot/map_bracket.h"
 #include "rotodom/types/pure_rotation_segment.h"
 
 namespace rotslam {
@@ -32,6 +33,8 @@ struct RefinementStart {
   const std::vector<Track>& tracks;  // outliers among their observations are classified anew
   // Where both ends of one are keyframes of a component they share a centre.
   std::span<const PureRotationSegment> segments = {};
+  // Deviations of the rotations where they are measurements of a sensor.
+  std::map<FrameId, double> rotation_sigma_rad = {};
 };
 
 /// Bundle adjustment of one component, in its own scale, from poses of all its keyframes.
@@ -55,6 +58,11 @@ RefinedComponents RefineComponents(const RefinementStart& start,
                                    const Camera& camera,
                                    const BundleOptions& options,
                                    const TrackCompletion& complete = nullptr);
+
+/// BracketMap of every usable component, taken together: the least possible largest residual over
+/// all of them, and their own.
+/// @param options  of the known-rotation problem.
+MapBracket BracketComponents(const RefinedComponents& refined, const KrotOptions& options);
 
 /// Mean reprojection error over the observations of all bundles; zero where there are none.
 double MeanErrorPx(const std::vector<BundleSummary>& bundles);

@@ -6,25 +6,14 @@
 #include "rotodom/types/parallel.h"
 
 namespace rotslam {
+namespace {
 
-Eigen::Vector3d InterpolatedCenter(const CenterMap& centers,
-                                   const std::vector<double>& timestamps_s,
-                                   FrameId frame) {
-  const auto after = centers.lower_bound(frame);
-  if (after == centers.end()) return centers.rbegin()->second;
-  if (after->first == frame || after == centers.begin()) return after->second;
-  const auto before = std::prev(after);
-  const double from_s = timestamps_s[before->first.value];
-  const double to_s = timestamps_s[after->first.value];
-  const double weight = (timestamps_s[frame.value] - from_s) / (to_s - from_s);
-  return (1.0 - weight) * before->second + weight * after->second;
-}
-
-std::map<FrameId, ResectedPose> ResectFrames(const std::map<FrameId, ResectionStart>& starts,
+// Calls `find_pose(observations, start)` for each frame.
+template <class FindPose>
+std::map<FrameId, ResectedPose> ForEachFrame(const std::map<FrameId, ResectionStart>& starts,
                                              const SeenMap& map,
-                                             const Camera& camera,
-                                             const ResectionOptions& options,
-                                             int num_threads) {
+                                             int num_threads,
+                                             const FindPose& find_pose) {
   struct SeenFrame {
     FrameId id;
     const ResectionStart* start;
@@ -51,13 +40,48 @@ std::map<FrameId, ResectedPose> ResectFrames(const std::map<FrameId, ResectionSt
     }
   }
   ParallelFor(static_cast<int>(frames.size()), num_threads, [&](int k) {
-    frames[k].pose = ResectFrame(camera, frames[k].observations, *frames[k].start, options);
+    frames[k].pose = find_pose(frames[k].observations, *frames[k].start);
   });
   std::map<FrameId, ResectedPose> poses;
   for (const SeenFrame& frame : frames) {
     if (frame.pose) poses[frame.id] = *frame.pose;
   }
   return poses;
+}
+
+}  // namespace
+
+Eigen::Vector3d InterpolatedCenter(const CenterMap& centers,
+                                   const std::vector<double>& timestamps_s,
+                                   FrameId frame) {
+  const auto after = centers.lower_bound(frame);
+  if (after == centers.end()) return centers.rbegin()->second;
+  if (after->first == frame || after == centers.begin()) return after->second;
+  const auto before = std::prev(after);
+  const double from_s = timestamps_s[before->first.value];
+  const double to_s = timestamps_s[after->first.value];
+  const double weight = (timestamps_s[frame.value] - from_s) / (to_s - from_s);
+  return (1.0 - weight) * before->second + weight * after->second;
+}
+
+std::map<FrameId, ResectedPose> ResectFrames(const std::map<FrameId, ResectionStart>& starts,
+                                             const SeenMap& map,
+                                             const Camera& camera,
+                                             const ResectionOptions& options,
+                                             int num_threads) {
+  return ForEachFrame(starts, map, num_threads, [&](const auto& observations, const auto& start) {
+    return ResectFrame(camera, observations, start, options);
+  });
+}
+
+std::map<FrameId, ResectedPose> AssessFrames(const std::map<FrameId, ResectionStart>& poses,
+                                             const SeenMap& map,
+                                             const Camera& camera,
+                                             const ResectionOptions& options,
+                                             int num_threads) {
+  return ForEachFrame(poses, map, num_threads, [&](const auto& observations, const auto& start) {
+    return AssessPose(camera, observations, start, options);
+  });
 }
 
 }  // namespace rotslam

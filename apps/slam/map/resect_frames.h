@@ -30,4 +30,11 @@ std::map<FrameId, ResectedPose> ResectFrames(const std::map<FrameId, ResectionSt
                                              const ResectionOptions& options,
                                              int num_threads);
 
+/// What the points of a map tell about frames whose poses stay: AssessPose for each.
+std::map<FrameId, ResectedPose> AssessFrames(const std::map<FrameId, ResectionStart>& poses,
+                                             const SeenMap& map,
+                                             const Camera& camera,
+                                             const ResectionOptions& options,
+                                             int num_threads);
+
 }  // namespace rotslam

@@ -9,8 +9,7 @@ bool HasG2oTag(const RotationGraphInput& input) {
   if (input.first_words.empty()) return false;
   const std::string& tag = input.first_words.front();
   const bool is_toro = tag == "VERTEX3" || tag == "EDGE3" || tag == "VERTEX2" || tag == "EDGE2";
-  return !is_toro && (tag.starts_with("VERTEX") || tag.starts_with("EDGE") || tag == "FIX" ||
-                      tag.starts_with("PARAMS"));
+  return !is_toro && IsGraphTag(tag);
 }
 
 RotationList ReadG2oGraph(const RotationGraphInput& input, double sigma_rad) {
@@ -22,7 +21,7 @@ RotationList ReadG2oGraph(const RotationGraphInput& input, double sigma_rad) {
 namespace forms {
 
 RotationGraphForm RotationGraphFormG2o() {
-  return {"g2o", "VERTEX_SE3:QUAT, EDGE_SE3:QUAT, FIX", HasG2oTag, ReadG2oGraph};
+  return {"g2o", "VERTEX_SE3:QUAT, EDGE_SE3:QUAT (and :EULER), FIX", HasG2oTag, ReadG2oGraph};
 }
 
 }  // namespace forms

@@ -8,8 +8,10 @@
 namespace rotslam {
 namespace {
 
+constexpr std::size_t kWordsOfOneDSfmLine = 14;
+
 bool RecognisesOneDSfm(const RotationGraphInput& input) {
-  return input.first_words.size() == 14 && IsWholeNumber(input.first_words[0]) &&
+  return input.first_words.size() == kWordsOfOneDSfmLine && IsWholeNumber(input.first_words[0]) &&
          IsWholeNumber(input.first_words[1]);
 }
 
@@ -19,7 +21,10 @@ RotationList ReadOneDSfm(const RotationGraphInput& input, double sigma_rad) {
   ForEachGraphLine(input, [&](GraphLine& line) {
     GraphLine peek = line;
     const std::string_view first = peek.Word();
-    if (!IsNumberWord(first)) {
+    std::size_t count = 1;
+    for (; !peek.AtEnd(); ++count) peek.Word();
+    // Names of views are read, other words are not.
+    if (!IsNumberWord(first) && (IsGraphTag(first) || count != kWordsOfOneDSfmLine)) {
       builder.Skip(line, first);
       return;
     }

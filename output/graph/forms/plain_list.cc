@@ -1,6 +1,7 @@
 // Lines of two ids and a quaternion or a rotation matrix.
 
 #include <array>
+#include <cmath>
 
 #include "output/graph/rotation_graph_form.h"
 #include "output/trajectory/unit_length.h"
@@ -15,28 +16,46 @@ bool RecognisesPlainList(const RotationGraphInput& input) {
   const std::size_t count = input.first_words.size();
   if (count < 3 || count == kWordsOfOneDSfm || count == kWordsOfRelpose) return false;
   const std::string& first = input.first_words.front();
-  const bool has_tag = first.starts_with("VERTEX") || first.starts_with("EDGE") ||
-                       first.starts_with("PARAMS") || first == "FIX";
-  if (has_tag) return false;
-  return IsWholeNumber(first) || count == 6 || count == 11;
+  if (IsGraphTag(first)) return false;
+  return IsWholeNumber(first) || count == 6 || count == 7 || count == 11;
+}
+
+// In a list of numbered views, a line that begins with a word is an edge when two ids and the
+// numbers of a rotation stand in it.
+bool IsEdgeOfNames(GraphLine line) {
+  if (IsGraphTag(line.Word()) || line.AtEnd()) return false;
+  line.Word();
+  std::size_t count = 0;
+  for (; !line.AtEnd(); ++count) {
+    if (!IsNumberWord(line.Word())) return false;
+  }
+  return count == 4 || count == 5 || count >= 9;
 }
 
 RotationList ReadPlainList(const RotationGraphInput& input, double sigma_rad) {
-  const Eigen::Matrix3d covariance = sigma_rad * sigma_rad * Eigen::Matrix3d::Identity();
+  const Eigen::Matrix3d isotropic = sigma_rad * sigma_rad * Eigen::Matrix3d::Identity();
   const bool has_numbers = IsWholeNumber(input.first_words.front());
   RotationGraphBuilder builder(input);
   bool has_quaternions = false;
   bool has_matrices = false;
   int num_longer = 0;
+  int num_sigmas = 0;
   ForEachGraphLine(input, [&](GraphLine& line) {
     GraphLine peek = line;
     const std::string_view first = peek.Word();
-    if (has_numbers && !IsNumberWord(first)) {
+    if (IsGraphTag(first) || (has_numbers && !IsNumberWord(first) && !IsEdgeOfNames(line))) {
       builder.Skip(line, first);
       return;
     }
-    const std::string i = has_numbers ? line.Id() : std::string(line.Word());
-    const std::string j = has_numbers ? line.Id() : std::string(line.Word());
+    // In a list of names a decimal number, a time for one, is a name.
+    const auto take_id = [&] {
+      GraphLine next = line;
+      const std::string_view word = next.Word();
+      if (has_numbers || IsWholeNumber(word)) return line.Id();
+      return std::string(line.Word());
+    };
+    const std::string i = take_id();
+    const std::string j = take_id();
     std::array<double, 9> numbers{};
     std::size_t count = 0;
     while (!line.AtEnd() && count < numbers.size()) numbers[count++] = line.Number();
@@ -44,11 +63,21 @@ RotationList ReadPlainList(const RotationGraphInput& input, double sigma_rad) {
     while (!rest.AtEnd()) rest.Number();
     if (!line.AtEnd()) ++num_longer;
     Rotation rotation;
-    if (count == 4) {
+    Eigen::Matrix3d covariance = isotropic;
+    if (count == 4 || count == 5) {
       const Eigen::Quaterniond q(numbers[3], numbers[0], numbers[1], numbers[2]);
       if (!IsUnitLength(q.norm())) line.Fail("the quaternion is not of unit length");
       rotation = Rotation(q);
       has_quaternions = true;
+      if (count == 5) {
+        const double own_sigma_rad = numbers[4] * kRadFromDeg;
+        if (!(own_sigma_rad > 0.0 && own_sigma_rad * own_sigma_rad > 0.0) ||
+            !std::isfinite(own_sigma_rad * own_sigma_rad)) {
+          line.Fail("expected a standard deviation in deg above zero behind the quaternion");
+        }
+        covariance = own_sigma_rad * own_sigma_rad * Eigen::Matrix3d::Identity();
+        ++num_sigmas;
+      }
     } else if (count == 9) {
       rotation = RotationOfNine(line, numbers);
       has_matrices = true;
@@ -61,6 +90,10 @@ RotationList ReadPlainList(const RotationGraphInput& input, double sigma_rad) {
   if (num_longer > 0) {
     builder.Note("the numbers behind the rotation are not used (" + std::to_string(num_longer) +
                  (num_longer == 1 ? " line)" : " lines)"));
+  }
+  if (num_sigmas > 0) {
+    builder.Note("the fifth number behind the ids is the edge's standard deviation in deg (" +
+                 std::to_string(num_sigmas) + (num_sigmas == 1 ? " line)" : " lines)"));
   }
   std::vector<EdgeReading> readings = {{"x_j = R x_i", false, false, false},
                                        {"x_i = R x_j", true, false, false}};
@@ -79,7 +112,8 @@ namespace forms {
 RotationGraphForm RotationGraphFormPlainList() {
   return {
       "list of rotations",
-      "i j qx qy qz qw, or i j and a 3x3 matrix by rows; x_j = R x_i unless cycles say otherwise",
+      "i j qx qy qz qw [sigma_deg], or i j and a 3x3 matrix by rows; x_j = R x_i unless cycles say "
+      "otherwise",
       RecognisesPlainList,
       ReadPlainList};
 }

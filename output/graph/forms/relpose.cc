@@ -11,7 +11,7 @@ namespace {
 
 bool RecognisesRelpose(const RotationGraphInput& input) {
   const std::vector<std::string>& words = input.first_words;
-  if (words.size() != 9 || words[0].starts_with("VERTEX") || words[0].starts_with("EDGE")) {
+  if (words.size() != 9 || IsGraphTag(words[0])) {
     return false;
   }
   for (std::size_t k = 2; k < words.size(); ++k) {
@@ -26,8 +26,8 @@ RotationList ReadRelpose(const RotationGraphInput& input, double sigma_rad) {
   int num_header_lines = 0;
   ForEachGraphLine(input, [&](GraphLine& line) {
     GraphLine peek = line;
-    peek.Word();
-    if (peek.AtEnd() || (num_header_lines == 0 && !peek.AtEnd() && [&] {
+    const bool has_tag = IsGraphTag(peek.Word());
+    if (has_tag || peek.AtEnd() || (num_header_lines == 0 && !peek.AtEnd() && [&] {
           while (!peek.AtEnd()) {
             if (IsNumberWord(peek.Word())) return false;
           }

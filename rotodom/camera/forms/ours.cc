@@ -1,4 +1,5 @@
 #include <algorithm>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -18,7 +19,12 @@ const std::vector<std::string>& OurKeys() {
                                                  "cy",
                                                  "distortion",
                                                  "readout_s",
-                                                 "readout_from"};
+                                                 "readout_from",
+                                                 "sigma_focal_px",
+                                                 "sigma_cx_px",
+                                                 "sigma_cy_px",
+                                                 "sigma_distortion",
+                                                 "masked_px"};
   return kKeys;
 }
 
@@ -45,6 +51,71 @@ void ReadOurDistortion(const Section& section, Camera& camera) {
   std::copy(values.begin(), values.end(), camera.distortion.begin());
   if (camera.model != CameraModel::kFov) return;
   if (const auto problem = SetFovDistortion(values, camera)) section.Fail("distortion", *problem);
+}
+
+// All of them or none.
+std::optional<LensSigmas> ReadSigmas(const Section& section, const Camera& camera) {
+  if (!section.HasAny({"sigma_focal_px", "sigma_cx_px", "sigma_cy_px", "sigma_distortion"})) {
+    return std::nullopt;
+  }
+  LensSigmas sigmas;
+  const auto read = [&](const char* key) {
+    const double value = section.Number(key);
+    if (value < 0.0) section.FailValue(key, "must not be negative");
+    return value;
+  };
+  sigmas.focal_px = read("sigma_focal_px");
+  sigmas.cx_px = read("sigma_cx_px");
+  sigmas.cy_px = read("sigma_cy_px");
+  const auto wanted = static_cast<std::size_t>(NumLensCoefficients(camera.model));
+  const std::vector<double> values = section.Numbers("sigma_distortion");
+  if (values.size() != wanted) {
+    section.Fail("sigma_distortion",
+                 "has " + std::to_string(values.size()) + " values, " + Name(camera.model) +
+                     " takes " + std::to_string(wanted));
+  }
+  for (std::size_t k = 0; k < wanted; ++k) {
+    if (values[k] < 0.0) section.Fail("sigma_distortion", "must not be negative");
+    sigmas.distortion[k] = values[k];
+  }
+  return sigmas;
+}
+
+// `masked_px`: one polygon [[x, y], ...], or a list of polygons.
+std::vector<std::vector<Eigen::Vector2d>> ReadMaskedParts(const Section& section) {
+  std::vector<std::vector<Eigen::Vector2d>> polygons;
+  const TreeNode* masked = nullptr;
+  for (const TreeNode& child : section.node().children) {
+    if (child.key == "masked_px") masked = &child;
+  }
+  if (masked == nullptr || masked->kind == TreeNode::Kind::kNothing) return polygons;
+  const auto fail = [&](const TreeNode& node) {
+    FailAt(section.file(),
+           node.line,
+           "masked_px must be polygons of at least three points: [[[x, y], [x, y], [x, y]]]");
+  };
+  const auto is_list = [](const TreeNode& node) { return node.kind == TreeNode::Kind::kList; };
+  const auto is_point = [&](const TreeNode& node) {
+    return is_list(node) && node.children.size() == 2 && !is_list(node.children.front());
+  };
+  const auto read = [&](const TreeNode& node) {
+    std::vector<Eigen::Vector2d>& polygon = polygons.emplace_back();
+    if (!is_list(node) || node.children.size() < 3) fail(node);
+    for (const TreeNode& point : node.children) {
+      if (!is_point(point)) fail(point);
+      const auto number = [&](const TreeNode& value) {
+        return FiniteNumber(section.file(), value.line, "masked_px", value.text);
+      };
+      polygon.emplace_back(number(point.children[0]), number(point.children[1]));
+    }
+  };
+  if (!is_list(*masked) || masked->children.empty()) fail(*masked);
+  if (is_point(masked->children.front())) {
+    read(*masked);
+    return polygons;
+  }
+  for (const TreeNode& polygon : masked->children) read(polygon);
+  return polygons;
 }
 
 Camera ReadOurs(const Section& section) {
@@ -106,6 +177,8 @@ CameraForm CameraFormOurs() {
   form.read = [](const CameraDocument& document) {
     CameraFile file;
     file.cameras.push_back({"", ReadOurs(document.root()), {}, ""});
+    file.cameras.back().sigmas = ReadSigmas(document.root(), file.cameras.back().camera);
+    file.cameras.back().masked_px = ReadMaskedParts(document.root());
     return file;
   };
   return form;

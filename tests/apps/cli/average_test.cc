@@ -124,7 +124,11 @@ TEST_F(AverageTest, KeepsIdsPositionsAndFixedVertices) {
   const RotationList list = ReadRotationList(Path("out.g2o"), 1.0);
   EXPECT_THAT(list.ids, ElementsAre("7", "8", "6989586621679009792"));
   EXPECT_THAT(list.fixed, ElementsAre(FrameId{0}));
-  EXPECT_EQ(list.center_in_world.at(FrameId{2}), Eigen::Vector3d(1, 2, 3));
+  // The fixed vertex and the one without an edge stay; the edge says the other is at the first.
+  EXPECT_EQ(list.center_in_world.at(FrameId{0}), Eigen::Vector3d(4, 5, 6));
+  EXPECT_EQ(list.center_in_world.at(FrameId{1}), Eigen::Vector3d(7, 8, 9));
+  EXPECT_LT((list.center_in_world.at(FrameId{2}) - Eigen::Vector3d(4, 5, 6)).norm(), 1e-9);
+  EXPECT_THAT(result.error, HasSubstr("not read: 1 line of \"SOMETHING\" (5)"));
   EXPECT_NEAR(list.cam_from_world.at(FrameId{0}).AngleDeg(), 180.0, 1e-6);
   EXPECT_NEAR(list.cam_from_world.at(FrameId{2}).AngleDeg(), 180.0, 1e-6);
   EXPECT_NEAR(list.cam_from_world.at(FrameId{1}).AngleDeg(), 0.0, 1e-6);
@@ -242,12 +246,182 @@ TEST_F(AverageTest, FormsThatPeopleBringGiveTheTruth) {
 }
 
 TEST_F(AverageTest, NegativeIdsAreIds) {
-  const CommandResult result = Average(
-      Write("negative.txt", "-2 -1 0 0 0.1736482 0.9848078\n-1 0 0 0 0.1736482 0.9848078\n"),
-      Path("out.txt"));
+  const CommandResult result =
+      Average(Write("negative.txt",
+                    "-2 -1 0 0 0.1736482 0.9848078\n-1 +0 0 0 0.1736482 0.9848078\n"
+                    "0 left 0 0 0.1736482 0.9848078\nleft -2 0 0 0 1 200\n"),
+              Path("out.txt"));
   ASSERT_EQ(result.exit_code, 0) << result.error;
-  EXPECT_EQ(Number(result, "views"), 3.0);
-  EXPECT_THAT(ReadWholeFile(Path("out.txt")), HasSubstr("\n-2 "));
+  EXPECT_EQ(Number(result, "views"), 4.0);
+  EXPECT_EQ(Number(result, "edges"), 4.0);
+  EXPECT_THAT(ReadWholeFile(Path("out.txt")), AllOf(HasSubstr("\n-2 "), HasSubstr("\nleft ")));
+}
+
+TEST_F(AverageTest, PlaneGraphsAreRefused) {
+  const CommandResult result =
+      Average(Write("plane.g2o",
+                    "VERTEX_SE2 0 0 0 0\nVERTEX_SE2 1 1 0 0\nEDGE_SE2 0 1 1 0 0 1 0 0 1 0 1\n"),
+              Path("out.g2o"));
+  EXPECT_EQ(result.exit_code, 1);
+  EXPECT_EQ(Lines(result.error).size(), 1u) << result.error;
+  EXPECT_THAT(result.error, HasSubstr("is a 2-D graph"));
+}
+
+// Two views of 200 hang on one edge each, and are far from the truth.
+TEST_F(AverageTest, WeakViewsAreNamedAndLeftOut) {
+  const fs::path weak = fs::path(ROTSLAM_SHARED_DIR) / "cases/inputs/parts/average_weak_nodes.txt";
+  if (!fs::exists(weak)) GTEST_SKIP() << weak << " is not here";
+  const CommandResult named = Average(weak,
+                                      Path("out.txt"),
+                                      {"--edges",
+                                       Path("edges.csv").string(),
+                                       "--nodes",
+                                       Path("nodes.csv").string(),
+                                       "--log",
+                                       Path("log.txt").string()});
+  ASSERT_EQ(named.exit_code, 0) << named.error;
+  EXPECT_THAT(named.error, HasSubstr("2 of the 200 views (56, 150) hang on at most one edge"));
+  EXPECT_THAT(ReadWholeFile(Path("log.txt")),
+              AllOf(HasSubstr("(56, 150)"), HasSubstr("robust, in squared")));
+  const std::vector<std::string> edges = Lines(ReadWholeFile(Path("edges.csv")));
+  ASSERT_EQ(edges.size(), 801u);
+  EXPECT_EQ(edges[0], "i,j,residual_deg,residual_sigmas,weight,inlier,component");
+  int num_inliers = 0;
+  for (std::size_t k = 1; k < edges.size(); ++k) {
+    double deg = 0.0, sigmas = 0.0, weight = 0.0;
+    int i = 0, j = 0, inlier = 0, component = -1;
+    ASSERT_EQ(std::sscanf(edges[k].c_str(),
+                          "%d,%d,%lf,%lf,%lf,%d,%d",
+                          &i,
+                          &j,
+                          &deg,
+                          &sigmas,
+                          &weight,
+                          &inlier,
+                          &component),
+              7)
+        << edges[k];
+    EXPECT_EQ(inlier, sigmas <= 6.0 ? 1 : 0);
+    EXPECT_NEAR(weight, std::pow(36.0 / (36.0 + sigmas * sigmas), 2), 1e-5);
+    EXPECT_EQ(component, 0);
+    num_inliers += inlier;
+  }
+  EXPECT_NEAR(Number(named, "inliers"), num_inliers / 8.0, 0.01);
+  const std::vector<std::string> nodes = Lines(ReadWholeFile(Path("nodes.csv")));
+  ASSERT_EQ(nodes.size(), 201u);
+  EXPECT_THAT(nodes, testing::Contains(testing::StartsWith("150,0,1,")));
+  const std::vector<std::string> lines = Lines(ReadWholeFile(Path("out.txt")));
+  ASSERT_EQ(lines.size(), 201u);
+  // One edge of one degree: more than a degree from the mean; the others less.
+  double sigma_deg[3] = {};
+  std::sscanf(lines[151].c_str(),
+              "150 %*f %*f %*f %*f %lf %lf %lf",
+              &sigma_deg[0],
+              &sigma_deg[1],
+              &sigma_deg[2]);
+  EXPECT_GT(sigma_deg[0], 1.0);
+  EXPECT_LT(sigma_deg[0], 1.5);
+
+  const CommandResult left_out = Average(weak, Path("out.txt"), {"--min-support", "2"});
+  ASSERT_EQ(left_out.exit_code, 0) << left_out.error;
+  const std::string text = ReadWholeFile(Path("out.txt"));
+  EXPECT_EQ(Lines(text).size(), 199u);
+  EXPECT_THAT(text, testing::Not(HasSubstr("\n150 ")));
+  EXPECT_THAT(left_out.error, HasSubstr("left out"));
+}
+
+// A graph whose orientations are exact and whose vertices lie elsewhere.
+TEST_F(AverageTest, PositionsFitTheOrientations) {
+  RotationList written;
+  RotationMap cam_from_world;
+  CenterMap centers;
+  for (int k = 0; k < 12; ++k) {
+    written.ids.push_back(std::to_string(k));
+    cam_from_world[FrameId{k}] = Rotation::Exp({0.3 * k, 0.1 * k * k, -0.2 * k});
+    centers[FrameId{k}] = Eigen::Vector3d(std::sin(k), 2.0 * k, std::cos(3.0 * k));
+    written.center_in_world[FrameId{k}] = Eigen::Vector3d::Constant(k);
+  }
+  for (int k = 0; k < 24; ++k) {
+    RelativeRotation edge;
+    edge.i = FrameId{k % 12};
+    edge.j = FrameId{(k % 12 + 1 + k / 12) % 12};
+    edge.j_from_i = cam_from_world[edge.j] * cam_from_world[edge.i].Inverse();
+    edge.covariance = 1e-4 * Eigen::Matrix3d::Identity();
+    written.edges.push_back(edge);
+    EdgeTranslation translation;
+    translation.j_in_i = cam_from_world[edge.i] * (centers[edge.j] - centers[edge.i]);
+    translation.information.diagonal() << 5, 5, 5, 4e4, 4e4, 4e4;
+    written.translations.push_back(translation);
+  }
+  WriteRotationList(Path("in.g2o"), written, {cam_from_world, written.center_in_world, {}});
+  for (const std::vector<std::string>& more : {std::vector<std::string>{}, {"--certify"}}) {
+    const CommandResult result = Average(Path("in.g2o"), Path("out.g2o"), more);
+    ASSERT_EQ(result.exit_code, 0) << result.error;
+    EXPECT_THAT(result.output, HasSubstr("are the least squares of the inliers' translations"));
+    const RotationList read = ReadRotationList(Path("out.g2o"), 1.0);
+    ASSERT_EQ(read.translations.size(), 24u);
+    for (std::size_t k = 0; k < read.edges.size(); ++k) {
+      const RelativeRotation& edge = read.edges[k];
+      const Eigen::Vector3d between =
+          read.cam_from_world.at(edge.i) *
+          (read.center_in_world.at(edge.j) - read.center_in_world.at(edge.i));
+      EXPECT_LT((between - written.translations[k].j_in_i).norm(), 1e-7);
+      EXPECT_LT((read.translations[k].information - written.translations[k].information).norm(),
+                1e-6);
+    }
+    EXPECT_EQ(read.center_in_world.at(FrameId{0}), Eigen::Vector3d::Zero());
+  }
+}
+
+// The written orientations have the certified cost.
+TEST_F(AverageTest, WritesWhatItCertifies) {
+  const WrongEdges scene = MakeWrongEdges({.num_views = 60, .noise_deg = 2.0, .wrong_ratio = 0.1});
+  std::string text;
+  for (const RelativeRotation& edge : scene.edges) {
+    text += std::to_string(edge.i.value) + " " + std::to_string(edge.j.value) +
+            Words(Coefficients(edge.j_from_i)) + " 1.5\n";
+  }
+  const auto graph = Write("graph.txt", text);
+  const auto edges = Path("edges.csv");
+  const CommandResult result =
+      Average(graph, Path("out.g2o"), {"--certify", "--edges", edges.string()});
+  ASSERT_EQ(result.exit_code, 0) << result.error;
+  EXPECT_THAT(result.output, HasSubstr("all positions in"));
+  // Of the robust solution, whose inliers the certificate takes.
+  ASSERT_EQ(Average(graph, Path("robust.g2o"), {"--edges", edges.string()}).exit_code, 0);
+  const std::vector<std::string> lines = Lines(ReadWholeFile(edges));
+  const double variance = std::pow(1.5 * kRadFromDeg, 2);
+  const auto cost_of = [&](const RotationList& list) {
+    double cost = 0.0;
+    for (std::size_t k = 0; k < scene.edges.size(); ++k) {
+      if (lines[k + 1].find(",1,") == std::string::npos) continue;
+      const RelativeRotation& edge = scene.edges[k];
+      cost += (list.cam_from_world.at(edge.j).Matrix() -
+               edge.j_from_i.Matrix() * list.cam_from_world.at(edge.i).Matrix())
+                  .squaredNorm() /
+              variance;
+    }
+    return cost;
+  };
+  const double certified = Number(result, "chordal cost");
+  EXPECT_NEAR(cost_of(ReadRotationList(Path("out.g2o"), 1.0)), certified, 1e-5 * certified);
+  EXPECT_GT(cost_of(ReadRotationList(Path("robust.g2o"), 1.0)), certified * (1.0 + 1e-4));
+}
+
+TEST_F(AverageTest, StartsFromAFile) {
+  const auto list = Write("list.txt", "0 1 0 0 0 1\n1 2 0 0 0 1\n2 0 0 0 0 1\n");
+  const CommandResult no_vertices = Average(list, Path("out.txt"), {"--start"});
+  EXPECT_EQ(no_vertices.exit_code, 1);
+  EXPECT_THAT(no_vertices.error, HasSubstr("--start-from"));
+  const auto start = Write("start.txt", "0 1 0 0 0\n1 1 0 0 0\n2 1 0 0 0\n");
+  const CommandResult result = Average(list, Path("out.txt"), {"--start-from", start.string()});
+  ASSERT_EQ(result.exit_code, 0) << result.error;
+  // The first view keeps the start's orientation.
+  EXPECT_THAT(ReadWholeFile(Path("out.txt")), HasSubstr("\n2 1 0 0 "));
+  const CommandResult missing =
+      Average(list, Path("out.txt"), {"--start-from", Write("short.txt", "0 1 0 0 0\n").string()});
+  EXPECT_EQ(missing.exit_code, 1);
+  EXPECT_THAT(missing.error, HasSubstr("has no orientation of view 1"));
 }
 
 }  // namespace

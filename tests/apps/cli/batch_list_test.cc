@@ -59,6 +59,10 @@ TEST_F(BatchList, RefusesNumbersThatItDoesNotHave) {
   EXPECT_THAT(Refusal("- path: a\n", {"--only", "0"}), HasSubstr("--only"));
   EXPECT_THAT(Refusal("- path: a\n", {"--jobs", "0"}), HasSubstr("--jobs"));
   EXPECT_THAT(Refusal("- path: a\n", {"--collect", "--slurm", "x"}), HasSubstr("excludes"));
+  EXPECT_THAT(Refusal("- path: a\n", {"--slurm-options", "--mem=8G"}), HasSubstr("--slurm"));
+  EXPECT_THAT(Refusal("- path: a\n",
+                      {"--slurm", (folder_.path() / "x").string(), "--slurm-options", "mem=8G"}),
+              HasSubstr("expected options of sbatch"));
 }
 
 }  // namespace

@@ -74,6 +74,7 @@ class Batch : public testing::Test {
     const std::vector<std::string> names = Cut(lines.empty() ? "" : lines[0]);
     for (std::size_t k = 1; k < lines.size(); ++k) {
       const std::vector<std::string> fields = Cut(lines[k]);
+      if (fields[0].starts_with('(')) continue;  // the summary
       for (std::size_t n = 0; n < names.size() && n < fields.size(); ++n) {
         results[fields[0]][names[n]] = fields[n];
       }
@@ -104,6 +105,12 @@ TEST_F(Batch, SurvivesABrokenSequenceAndGoesOnWhereItStopped) {
   ASSERT_EQ(results.size(), 3u);
   EXPECT_EQ(results["walk"]["status"], "done");
   EXPECT_EQ(results["walk"]["frames"], "24");
+  const std::vector<std::string> table = Lines(ReadWholeFile(Out() / "results.csv"));
+  ASSERT_EQ(table.size(), 6u);
+  EXPECT_THAT(table[4], AllOf(testing::StartsWith("(median),"), HasSubstr(",2 of 3 done,")));
+  EXPECT_THAT(table[5], AllOf(testing::StartsWith("(worst),"), HasSubstr(",1 failed,")));
+  EXPECT_THAT(ReadWholeFile(Out() / "results.html"),
+              HasSubstr("<a href=\"broken/log.txt\">failed</a>"));
   EXPECT_EQ(results["walk"]["coverage"], "1.0000");
   const TrajectoryMetrics metrics =
       Compare(shared_->path() / "handheld/groundtruth_tum.txt", Out() / "walk/trajectory_tum.txt");
@@ -196,6 +203,22 @@ TEST_F(Batch, StopsInGoodOrderAndGoesOn) {
   results = Results();
   EXPECT_EQ(results["walk"]["status"], "done");
   EXPECT_EQ(results["gimbal"]["status"], "done");
+}
+
+TEST_F(Batch, RunsSequencesWithoutCalibration) {
+  const fs::path images = folder_.path() / "uncalibrated";
+  fs::create_directories(images);
+  for (const auto& entry : fs::directory_iterator(shared_->path() / "handheld/rgb")) {
+    fs::create_hard_link(entry.path(), images / entry.path().filename());
+  }
+  const std::string path = "- path: " + images.string() + "\n  command: rotations\n";
+  for (const char* more : {"", "  camera: none\n"}) {
+    const CommandResult result = RunBatch(folder_.Write("uncalibrated.yaml", path + more));
+    ASSERT_EQ(result.exit_code, 0) << result.error;
+    EXPECT_EQ(Results()["uncalibrated"]["status"], "done");
+    const auto summary = nlohmann::json::parse(ReadWholeFile(Out() / "uncalibrated/summary.json"));
+    EXPECT_EQ(summary["calibration"]["source"], "images");
+  }
 }
 
 // A long sequence that is stopped in its middle, however that comes about.
@@ -308,6 +331,13 @@ TEST_P(StoppedBatch, GoesOnInTheMiddleOfASequence) {
   EXPECT_THAT(Log(), HasSubstr("resumed: frames 0 to "));
   EXPECT_EQ(Results()["long"]["status"], "done");
   EXPECT_EQ(Results()["long"]["frames"], std::to_string(kNumImages));
+  if (GetParam() != Stop::kKillBatch) {
+    // The time of both parts.
+    const auto record = nlohmann::json::parse(ReadWholeFile(Out() / "long/batch.json"));
+    EXPECT_GT(record["earlier_wall_s"], 0.0);
+    EXPECT_GT(record["wall_s"], record["earlier_wall_s"]);
+    EXPECT_GT(record["cpu_s"], record["earlier_cpu_s"]);
+  }
   ExpectWhatARunInOnePieceGives(list);
 }
 
@@ -347,9 +377,18 @@ TEST_F(Batch, RunsAsAnArrayJob) {
   fs::copy_file(List(), list);
   const fs::path out = strange / "out";
   const std::string script = (strange / "job.sh").string();
-  const CommandResult written =
-      Rotslam({"batch", list.string(), "--out", out.string(), "--slurm", script, "--jobs", "2"});
+  const CommandResult written = Rotslam({"batch",
+                                         list.string(),
+                                         "--out",
+                                         out.string(),
+                                         "--slurm",
+                                         script,
+                                         "--jobs",
+                                         "2",
+                                         "--slurm-options",
+                                         "--time=2:00:00 --mem 8G"});
   ASSERT_EQ(written.exit_code, 0) << written.error;
+  EXPECT_THAT(ReadWholeFile(script), HasSubstr("\n#SBATCH --time=2:00:00\n#SBATCH --mem 8G\n"));
   EXPECT_THAT(ReadWholeFile(script), HasSubstr("\n#SBATCH --array=1-3%2\n"));
   EXPECT_THAT(Lines(ReadWholeFile(script)),
               Not(Contains(AllOf(HasSubstr("#SBATCH"), HasSubstr("HOME")))));
@@ -366,7 +405,7 @@ TEST_F(Batch, RunsAsAnArrayJob) {
       Rotslam({"batch", list.string(), "--out", out.string(), "--collect"});
   EXPECT_EQ(collected.exit_code, 1);
   const std::string csv = ReadWholeFile(out / "results.csv");
-  EXPECT_THAT(Lines(csv), testing::SizeIs(4));
+  EXPECT_THAT(Lines(csv), testing::SizeIs(6));
   EXPECT_THAT(csv, AllOf(HasSubstr("\nwalk,24,1.0000,"), HasSubstr("\nbroken,,,")));
 }
 

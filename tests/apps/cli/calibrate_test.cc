@@ -230,7 +230,7 @@ TEST_F(Calibrate, WarnsWhereBoardsCoverLittle) {
 
 // ---- no calibration
 
-class FocalGuess : public SmallSequenceTest {
+class NoCalibration : public SmallSequenceTest {
  protected:
   // The images alone, as JPEG files with or without EXIF data.
   std::string Photos(std::optional<int> film_mm) const {
@@ -268,54 +268,57 @@ class FocalGuess : public SmallSequenceTest {
   }
 
   CommandResult Do(const std::string& command, const std::string& images) const {
-    return Rotslam({command, images, "--focal-guess", "--quiet", "--out=" + Out().string()});
+    return Rotslam({command, images, "--quiet", "--out=" + Out().string()});
   }
 };
 
-TEST_F(FocalGuess, WithoutACalibrationTheWaysToOneAreNamed) {
-  EXPECT_THAT(
-      Refusal(Run(Photos(std::nullopt))),
-      AllOf(
-          HasSubstr("--camera FILE"), HasSubstr("rotslam calibrate"), HasSubstr("--focal-guess")));
-}
-
-TEST_F(FocalGuess, TakesTheFocalLengthFromExif) {
+TEST_F(NoCalibration, StartsFromTheFocalLengthOfExif) {
   // 28 mm on film are 259 px here; the rendered camera has 251.
+  const double truth_px = ReadCamera(Good() / "camera.yaml").fx;
   const CommandResult result = Do("run", Photos(28));
   EXPECT_EQ(result.exit_code, 0) << result.error;
-  EXPECT_THAT(Lines(result.error),
-              Contains(AllOf(StartsWith("rotslam: warning: no calibration"),
-                             HasSubstr("from EXIF data, 258.9 px"))));
+  EXPECT_THAT(Lines(result.error), Contains(StartsWith("rotslam: warning: no calibration")));
   const nlohmann::ordered_json calibration = ReadSummary(Out())["calibration"];
-  EXPECT_EQ(calibration["source"], "focal_guess_exif");
-  EXPECT_NEAR(calibration["guess_px"].get<double>(), 28.0 / std::hypot(36.0, 24.0) * 400.0, 1e-9);
+  EXPECT_EQ(calibration["start"], "exif");
+  EXPECT_NEAR(calibration["start_px"].get<double>(), 28.0 / std::hypot(36.0, 24.0) * 400.0, 1e-9);
+  EXPECT_NEAR(calibration["refined_px"].get<double>(), truth_px, 0.05 * truth_px);
 }
 
-TEST_F(FocalGuess, ImagesCorrectAFocalLengthThatIsHalfAsLongAgain) {
+TEST_F(NoCalibration, ImagesCorrectAFocalLengthThatIsHalfAsLongAgain) {
   // 1.2 x 320 = 384 px instead of 251.
   const double truth_px = ReadCamera(Good() / "camera.yaml").fx;
   const CommandResult result = Do("run", Photos(std::nullopt));
   EXPECT_EQ(result.exit_code, 0) << result.error;
   const nlohmann::ordered_json calibration = ReadSummary(Out())["calibration"];
-  EXPECT_EQ(calibration["source"], "focal_guess_width");
-  // What the passes took is not counted with the stages.
+  EXPECT_EQ(calibration["source"], "images");
+  EXPECT_EQ(calibration["start_px"], 384.0);
+  EXPECT_NEAR(calibration["refined_px"].get<double>(), truth_px, 0.05 * truth_px);
+  // What the estimate took is not counted with the stages.
   const nlohmann::ordered_json seconds = ReadSummary(Out())["seconds"];
-  const double guess_s = seconds["focal_guess"].get<double>();
+  const double lens_s = seconds["lens"].get<double>();
   const double rest_s = seconds["orientations"].get<double>() + seconds["positions"].get<double>();
-  EXPECT_GT(guess_s, 0.0);
-  EXPECT_LE(guess_s + rest_s, seconds["total"].get<double>());
-  EXPECT_EQ(calibration["guess_px"], 384.0);
-  EXPECT_NEAR(calibration["first_pass_px"].get<double>(), truth_px, 0.1 * truth_px);
-  EXPECT_NEAR(calibration["refined_px"].get<double>(), truth_px, 0.1 * truth_px);
+  EXPECT_GT(lens_s, 0.0);
+  EXPECT_LE(lens_s + rest_s, seconds["total"].get<double>());
+  const Camera written = ReadCamera(Out() / "camera.yaml");
+  EXPECT_NEAR(written.fx, truth_px, 0.05 * truth_px);
 }
 
-TEST_F(FocalGuess, RotationsUseTheFirstPass) {
+TEST_F(NoCalibration, RotationsUseTheLensOfTheFirstFrames) {
   const double truth_px = ReadCamera(Good() / "camera.yaml").fx;
   const CommandResult result = Do("rotations", Photos(std::nullopt));
   EXPECT_EQ(result.exit_code, 0) << result.error;
   const nlohmann::ordered_json summary = ReadSummary(Out());
   EXPECT_NEAR(summary["camera"]["fx"].get<double>(), truth_px, 0.1 * truth_px);
-  EXPECT_THAT(Lines(result.error), Contains(HasSubstr("1.2 x the longer side, 384.0 px")));
+}
+
+TEST_F(NoCalibration, IsAskedForWhereOneLiesWithTheImages) {
+  for (const char* flag : {"--camera=none", "--focal-guess"}) {
+    const CommandResult result = Rotslam(
+        {"rotations", Good().string(), flag, "--quiet", "--no-report", "--out=" + Out().string()});
+    EXPECT_EQ(result.exit_code, 0) << result.error;
+    EXPECT_EQ(ReadSummary(Out())["calibration"]["source"], "images") << flag;
+    fs::remove_all(Out());
+  }
 }
 
 }  // namespace

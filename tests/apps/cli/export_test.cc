@@ -1,9 +1,12 @@
 // `rotslam export` on what a run has left; the formats themselves are tested beside their writers.
 
 #include <algorithm>
+#include <array>
 #include <bit>
 #include <cstdint>
+#include <cstdio>
 #include <filesystem>
+#include <fstream>
 #include <map>
 #include <set>
 #include <string>
@@ -12,10 +15,13 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 #include <nlohmann/json.hpp>
+#include <opencv2/imgcodecs.hpp>
+#include <opencv2/videoio.hpp>
 
 #include "output/export/colmap_model.h"
 #include "output/graph/g2o.h"
 #include "output/map/run_map.h"
+#include "output/trajectory/trajectory.h"
 #include "tests/apps/run_directory.h"
 #include "tests/apps/small_sequence.h"
 
@@ -61,6 +67,44 @@ TEST_F(ExportTest, TrajectoriesAreTheRunsOwn) {
   EXPECT_EQ(ReadWholeFile(Export("tum", {"--keyframes"})),
             ReadWholeFile(RunFolder() / "keyframes_tum.txt"));
   EXPECT_EQ(Lines(ReadWholeFile(Export("euroc"))).size(), kNumFrames + 1u);
+}
+
+TEST_F(ExportTest, RowsAreTheRunsOwn) {
+  EXPECT_EQ(ReadWholeFile(Export("csv")), ReadWholeFile(RunFolder() / "poses.csv"));
+}
+
+// What `rotations` leaves serves all that needs no positions.
+TEST_F(ExportTest, OrientationsAloneAreExportedWhereTheySuffice) {
+  const fs::path run = folder_.path() / "orientations";
+  const CommandResult made =
+      Rotslam({"rotations", Good().string(), "--quiet", "--out=" + run.string()});
+  ASSERT_EQ(made.exit_code, 0) << made.error;
+  const auto exported = [&](const std::string& format) {
+    const fs::path out = folder_.path() / "alone" / format;
+    const CommandResult result =
+        Rotslam({"export", run.string(), "--to", format, "--out", out.string()});
+    EXPECT_EQ(result.exit_code, 0) << format << result.error;
+    EXPECT_THAT(result.error, HasSubstr("orientations alone"));
+    return out;
+  };
+  const Trajectory written = ReadTrajectory(run / "rotations_tum.txt");
+  const Trajectory tum = ReadTrajectory(exported("tum"));
+  ASSERT_EQ(tum.size(), written.size());
+  for (std::size_t k = 0; k < tum.size(); ++k) {
+    EXPECT_EQ(tum[k].timestamp_s, written[k].timestamp_s);
+    EXPECT_LT((tum[k].world_from_cam * written[k].world_from_cam.Inverse()).Angle(), 1e-10);
+  }
+  EXPECT_EQ(Lines(ReadWholeFile(exported("csv"))).size(), kNumFrames + 1u);
+  EXPECT_EQ(Lines(ReadWholeFile(exported("kitti"))).size(), static_cast<std::size_t>(kNumFrames));
+  EXPECT_EQ(Lines(ReadWholeFile(exported("euroc"))).size(), kNumFrames + 1u);
+  EXPECT_EQ(ReadG2o(exported("g2o")).graph.edges().size(),
+            ReadG2o(run / "view_graph.g2o").graph.edges().size());
+  for (const char* format : {"colmap", "ply", "nerf"}) {
+    const CommandResult refused = Rotslam(
+        {"export", run.string(), "--to", format, "--out", (folder_.path() / "no").string()});
+    EXPECT_EQ(refused.exit_code, 1);
+    EXPECT_THAT(refused.error, HasSubstr("these do not: csv, euroc, g2o, kitti, tum"));
+  }
 }
 
 TEST_F(ExportTest, CloudIsTheRunsOwn) {
@@ -110,10 +154,133 @@ TEST_F(ExportTest, ImagesAreNamedFromWhereTheFileLies) {
   for (const nlohmann::json& frame : json["frames"]) {
     EXPECT_TRUE(fs::exists(file.parent_path() / frame["file_path"].get<std::string>()));
   }
+  const fs::path moved = folder_.path() / "moved";
+  fs::copy(Good() / "rgb", moved);
   const nlohmann::json elsewhere = nlohmann::json::parse(
-      ReadWholeFile(Export("openmvg", {"--images", "/data/left", "--all-frames"})));
-  EXPECT_EQ(elsewhere["root_path"], "/data/left");
+      ReadWholeFile(Export("openmvg", {"--images", moved.string(), "--all-frames"})));
+  EXPECT_EQ(elsewhere["root_path"], moved.string());
   EXPECT_GT(fs::file_size(Export("colmap-db")), 10000u);
+}
+
+// Exports by --images, and gives the line that refuses them; "" where they are taken.
+class ImagesTest : public ExportTest {
+ protected:
+  std::string Check(const fs::path& run, const fs::path& images) const {
+    const CommandResult result = Rotslam({"export",
+                                          run.string(),
+                                          "--to=nerf",
+                                          "--all-frames",
+                                          "--quiet",
+                                          "--images=" + images.string(),
+                                          "--out=" + (Out() / "transforms.json").string()});
+    if (result.exit_code != 0) return Refusal(result);
+    fs::remove_all(Out());
+    return result.error;
+  }
+};
+
+TEST_F(ImagesTest, AreComparedWithWhatTheRunSaw) {
+  const fs::path images = folder_.path() / "images";
+  fs::copy(Good() / "rgb", images);
+  EXPECT_EQ(Check(RunFolder(), images), "");
+  const std::vector<fs::path> names = Images(Good());
+  const auto image = [&](std::size_t k) { return images / names[k].filename(); };
+  for (std::size_t k = 0; k < names.size(); ++k) {  // the files of a camera that compresses
+    std::vector<unsigned char> jpeg;
+    cv::imencode(".jpg", cv::imread(names[k].string()), jpeg, {cv::IMWRITE_JPEG_QUALITY, 60});
+    cv::imwrite(image(k).string(), cv::imdecode(jpeg, cv::IMREAD_COLOR));
+  }
+  EXPECT_EQ(Check(RunFolder(), images), "");
+  for (std::size_t k = 12; k < names.size(); ++k) {  // one was dropped
+    fs::copy_file(names[k - 1], image(k), fs::copy_options::overwrite_existing);
+  }
+  EXPECT_THAT(Check(RunFolder(), images), HasSubstr("is not the picture that the run read as"));
+  cv::imwrite(image(3).string(), cv::Mat(240, 300, CV_8UC3, cv::Scalar(1, 2, 3)));
+  EXPECT_THAT(Check(RunFolder(), images), HasSubstr("is 300x240, the run's images were 320x240"));
+  fs::remove(image(2));
+  EXPECT_THAT(Check(RunFolder(), images), HasSubstr("is not there, the image of frame 2"));
+  EXPECT_THAT(Check(RunFolder(), folder_.path() / "nowhere"), HasSubstr("is no folder of images"));
+}
+
+TEST_F(ImagesTest, OfAnOlderRunAreNotCompared) {
+  const fs::path run = folder_.path() / "old";
+  fs::copy(RunFolder(), run, fs::copy_options::recursive);
+  fs::remove(run / "thumbnails.bin");
+  fs::remove(run / "matches.bin");
+  const CommandResult result = Rotslam({"export",
+                                        run.string(),
+                                        "--to=colmap",
+                                        "--images=" + (Good() / "rgb").string(),
+                                        "--out=" + (Out() / "sparse").string()});
+  EXPECT_EQ(result.exit_code, 0) << result.error;
+  EXPECT_THAT(result.error, HasSubstr("has no thumbnails.bin, an older version has written it"));
+  EXPECT_THAT(result.error, HasSubstr("has no matches.bin, an older version has written it"));
+}
+
+TEST_F(ImagesTest, OfAVideoAreTheFramesThatWereRead) {
+  const fs::path video = folder_.path() / "video.avi";
+  {
+    cv::VideoWriter writer(
+        video.string(), cv::VideoWriter::fourcc('M', 'J', 'P', 'G'), 30.0, {320, 240});
+    ASSERT_TRUE(writer.isOpened());
+    for (const fs::path& image : Images(Good())) writer.write(cv::imread(image.string()));
+  }
+  const fs::path run = folder_.path() / "run";
+  const CommandResult ran = Rotslam({"run",
+                                     video.string(),
+                                     "--camera=" + (Good() / "camera.yaml").string(),
+                                     "--out=" + run.string(),
+                                     "--no-report",
+                                     "--quiet"});
+  ASSERT_EQ(ran.exit_code, 0) << ran.error;
+  const fs::path images = folder_.path() / "frames";
+  const fs::path file = folder_.path() / "transforms.json";
+  const CommandResult exported = Rotslam({"export",
+                                          run.string(),
+                                          "--to=nerf",
+                                          "--quiet",
+                                          "--extract=" + images.string(),
+                                          "--out=" + file.string()});
+  ASSERT_EQ(exported.exit_code, 0) << exported.error;
+  EXPECT_EQ(exported.error, "");
+  EXPECT_EQ(FileNames(images).size(), static_cast<std::size_t>(kNumFrames));
+  const nlohmann::json transforms = nlohmann::json::parse(ReadWholeFile(file));
+  for (const nlohmann::json& frame : transforms["frames"]) {
+    EXPECT_TRUE(fs::exists(folder_.path() / frame["file_path"].get<std::string>()));
+  }
+  EXPECT_EQ(Check(run, images), "");
+  const auto name = [](int number, const char* ending) {
+    std::array<char, 24> text = {};
+    std::snprintf(text.data(), text.size(), "%06d%s", number, ending);
+    return std::string(text.data());
+  };
+  // JPEG files of the same numbers are as good; one more than there are frames is not.
+  const fs::path jpegs = folder_.path() / "jpegs";
+  fs::create_directories(jpegs);
+  for (int k = 0; k < kNumFrames; ++k) {
+    cv::imwrite((jpegs / name(k, ".jpg")).string(),
+                cv::imread((images / name(k, ".png")).string()));
+  }
+  EXPECT_EQ(Check(run, jpegs), "");
+  fs::copy(jpegs / name(0, ".jpg"), jpegs / name(kNumFrames, ".jpg"));
+  EXPECT_THAT(Check(run, jpegs), HasSubstr("has 25 images, the run has read 24 frames"));
+  fs::remove(video);
+  const CommandResult gone = Rotslam({"export",
+                                      run.string(),
+                                      "--to=nerf",
+                                      "--quiet",
+                                      "--extract=" + (folder_.path() / "again").string(),
+                                      "--out=" + (Out() / "transforms.json").string()});
+  EXPECT_THAT(Refusal(gone), HasSubstr("video.avi"));
+}
+
+TEST_F(ExportTest, ExtractsImageFilesAsTheyAre) {
+  const fs::path images = folder_.path() / "extracted";
+  Export("colmap", {"--extract", images.string()});
+  ASSERT_EQ(FileNames(images), FileNames(Good() / "rgb"));
+  for (const std::string& name : FileNames(images)) {
+    EXPECT_EQ(ReadWholeFile(images / name), ReadWholeFile(Good() / "rgb" / name));
+  }
 }
 
 int DifferingBits(const nlohmann::json& a, const nlohmann::json& b) {
@@ -175,7 +342,69 @@ TEST_F(ExportTest, StellasDescriptorsTellItsLandmarksApart) {
                                "--to=stella",
                                "--images=" + elsewhere.string(),
                                "--out=" + (Out() / "map.msg").string()})),
-              HasSubstr("file cannot be opened; --images names the folder"));
+              HasSubstr("is not there, the image of frame 0; --extract DIR writes all images"));
+}
+
+// A copy of the run whose frames 10 to 13 nothing places, and 14 to 23 have a scale of their own.
+fs::path InTwoParts(const fs::path& run, const fs::path& copy) {
+  fs::copy(run, copy, fs::copy_options::recursive);
+  std::ofstream(copy / "segments.csv") << "first_frame,last_frame,kind,component,scale,evidence\n"
+                                          "0,9,translating,0,reference,0\n"
+                                          "10,13,unplaced,0,none,0\n"
+                                          "14,23,translating,1,continuity,0\n";
+  return copy;
+}
+
+TEST_F(ExportTest, WritesComponentsApartAndLeavesOutWhatNothingPlaces) {
+  const fs::path run = InTwoParts(RunFolder(), folder_.path() / "parts");
+  const fs::path out = folder_.path() / "apart";
+  const auto write = [&](const std::string& format, const std::string& name, bool all = false) {
+    CommandResult result =
+        Rotslam({"export",
+                 run.string(),
+                 "--all-frames",
+                 "--to=" + format,
+                 "--out=" + (out / name).string()},
+                all ? std::vector<std::string>{"--with-unplaced"} : std::vector<std::string>());
+    EXPECT_EQ(result.exit_code, 0) << result.error;
+    return result.error;
+  };
+  const auto num_images = [&](const fs::path& model) {
+    return ReadColmapModel(out / model).reconstruction.cam_from_world.size();
+  };
+  write("colmap", "sparse", true);
+  EXPECT_EQ(num_images("sparse"), static_cast<std::size_t>(kNumFrames));
+  const std::string said = write("colmap", "sparse");
+  EXPECT_EQ(num_images("sparse/0"), 10u);
+  EXPECT_EQ(num_images("sparse/1"), 10u);
+  EXPECT_FALSE(fs::exists(out / "sparse" / "images.bin"));
+  EXPECT_THAT(said, HasSubstr("left out: frames 10-13, which nothing places; frames 14-23, whose"));
+  EXPECT_EQ(Lines(said).size(), 2u);
+
+  write("tum", "poses.txt");
+  EXPECT_EQ(ReadTrajectory(out / "poses.txt").size(), 10u);
+  EXPECT_EQ(ReadTrajectory(out / "poses_1.txt").size(), 10u);
+  write("tum", "all.txt", true);
+  EXPECT_EQ(ReadTrajectory(out / "all.txt").size(), static_cast<std::size_t>(kNumFrames));
+  EXPECT_FALSE(fs::exists(out / "all_1.txt"));
+  write("kitti", "kitti.txt");
+  EXPECT_EQ(ReadTrajectory(out / "kitti.txt").size(), static_cast<std::size_t>(kNumFrames));
+
+  write("nerf", "transforms.json");
+  for (const char* name : {"transforms.json", "transforms_1.json"}) {
+    EXPECT_EQ(nlohmann::json::parse(ReadWholeFile(out / name))["frames"].size(), 10u) << name;
+  }
+  write("g2o", "graph.g2o");
+  EXPECT_EQ(ReadG2o(out / "graph_1.g2o").cam_from_world.begin()->first, FrameId{14});
+}
+
+TEST_F(ExportTest, RefusesARunThatPlacesNothing) {
+  const fs::path run = InTwoParts(RunFolder(), folder_.path() / "nothing");
+  std::ofstream(run / "segments.csv") << "first_frame,last_frame,kind,component,scale,evidence\n"
+                                         "0,23,translating,-1,none,0\n";
+  EXPECT_THAT(
+      Refusal(Rotslam({"export", run.string(), "--to=tum", "--out=" + (Out() / "x").string()})),
+      HasSubstr("no frame of this run has a place; --with-unplaced"));
 }
 
 TEST_F(ExportTest, SaysWhatItCannotDo) {

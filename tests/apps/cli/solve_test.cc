@@ -1,13 +1,20 @@
 // `rotslam solve` on the kinds of input that it reads.
 
+#include <algorithm>
+#include <cmath>
+#include <cstdint>
 #include <filesystem>
 #include <fstream>
+#include <set>
+#include <sstream>
 #include <string>
+#include <vector>
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 #include <nlohmann/json.hpp>
 
+#include "output/export/colmap_model.h"
 #include "output/export/known_rotation_file.h"
 #include "output/trajectory/trajectory.h"
 #include "tests/apps/command_line.h"
@@ -18,9 +25,11 @@ namespace rotslam {
 namespace {
 
 namespace fs = std::filesystem;
+using testing::AllOf;
 using testing::Contains;
 using testing::ElementsAre;
 using testing::HasSubstr;
+using testing::IsSupersetOf;
 
 Scene Street() {
   SceneOptions options;
@@ -72,11 +81,26 @@ TEST_F(SolveTest, FindsTheSameStreetFromEveryKindOfInput) {
     EXPECT_THAT(result.error, HasSubstr("largest residual in ["));
     EXPECT_LT(ErrorOf(out, scene, shift), 0.05) << name;
     EXPECT_THAT(FileNames(out),
-                ElementsAre("cloud.ply", "keyframes_tum.txt", "removed.csv", "summary.json"));
+                IsSupersetOf({"cloud.ply",
+                              "keyframes_tum.txt",
+                              "map.bin",
+                              "map_all_frames.bin",
+                              "poses.csv",
+                              "removed.csv",
+                              "residuals.csv",
+                              "rotations.csv",
+                              "segments.csv",
+                              "summary.json",
+                              "trajectory_tum.txt",
+                              "views.csv"}));
     const nlohmann::json krot = Summary(out)["krot"];
     EXPECT_EQ(krot["status"], "converged");
     EXPECT_GT(krot["gamma_low_px"], 0.0);
     EXPECT_LE(krot["gamma_high_px"].get<double>(), 1.011 * krot["gamma_low_px"].get<double>());
+    const double high_px = krot["final"]["gamma_high_px"].get<double>();
+    EXPECT_LE(krot["final"]["gamma_low_px"].get<double>(), high_px);
+    EXPECT_LE(high_px, krot["final"]["largest_residual_px"].get<double>());
+    EXPECT_GT(krot["final"]["gamma_low_px"], 0.0);
   };
   solve("ours.txt", 0);
   solve("text", 1);
@@ -184,6 +208,261 @@ TEST_F(SolveTest, SaysWhyObservationsAreNotInTheMap) {
   const std::vector<std::string> lines = Lines(ReadWholeFile(Path("out") / "removed.csv"));
   EXPECT_EQ(lines.front(), "track,view,reason");
   EXPECT_THAT(lines, Contains(testing::StartsWith(line)));
+}
+
+// A line of residuals.csv.
+struct Residual {
+  std::string track;
+  std::string view;
+  double largest_px = 0.0;  // over the axes; NaN without a point
+  std::string state;
+};
+
+std::vector<Residual> ReadResiduals(const fs::path& file) {
+  std::vector<Residual> residuals;
+  const std::vector<std::string> lines = Lines(ReadWholeFile(file));
+  EXPECT_EQ(lines.front(), "track,view,dx_px,dy_px,state");
+  for (std::size_t k = 1; k < lines.size(); ++k) {
+    std::vector<std::string> fields;
+    std::istringstream stream(lines[k]);
+    for (std::string field; std::getline(stream, field, ',');) fields.push_back(field);
+    EXPECT_EQ(fields.size(), 5u) << lines[k];
+    const auto number = [](const std::string& text) {
+      return text.empty() ? std::nan("") : std::abs(std::stod(text));
+    };
+    residuals.push_back(
+        {fields[0], fields[1], std::max(number(fields[2]), number(fields[3])), fields[4]});
+  }
+  return residuals;
+}
+
+fs::path Case(const std::string& name) {
+  return fs::path(ROTSLAM_SHARED_DIR) / "cases/inputs/parts" / name;
+}
+
+// What is written without bundle adjustment has the residual that the bracket's upper end says.
+TEST_F(SolveTest, WritesTheSolutionOfTheBisection) {
+  WriteColmapText(Path("model"), Street());
+  const CommandResult result =
+      Rotslam({"solve", Path("model").string(), "--out", Path("out").string(), "--no-adjust"});
+  ASSERT_EQ(result.exit_code, 0) << result.error;
+  const nlohmann::json summary = Summary(Path("out"));
+  EXPECT_EQ(summary["options"]["krot"]["start"], "bisection");
+  EXPECT_FALSE(summary.contains("ba"));
+  const double high_px = summary["krot"]["gamma_high_px"];
+  EXPECT_GE(summary["krot"]["gamma_low_px"], 0.99 * high_px);
+  double largest_px = 0.0;
+  int num_kept = 0;
+  for (const Residual& one : ReadResiduals(Path("out") / "residuals.csv")) {
+    if (one.state != "kept") continue;
+    largest_px = std::max(largest_px, one.largest_px);
+    ++num_kept;
+  }
+  EXPECT_EQ(num_kept, summary["krot"]["bracket_observations"]);
+  EXPECT_NEAR(largest_px, high_px, 1e-6);
+  // Rotations come out as they went in.
+  const Scene scene = Street();
+  const Trajectory poses = ReadTrajectory(Path("out") / "keyframes_tum.txt");
+  ASSERT_EQ(poses.size(), scene.cam_from_world.size());
+  for (const StampedPose& pose : poses) {
+    const FrameId view{static_cast<int>(pose.timestamp_s) - 1};
+    EXPECT_LT((pose.world_from_cam * scene.cam_from_world.at(view)).AngleDeg(), 1e-5);
+  }
+}
+
+// Orientations that are exact, held by their sigma or by the flag, lead to better positions than
+// those that follow the keypoints' noise.
+TEST_F(SolveTest, HoldsOrientationsAsTightlyAsTheyAreKnown) {
+  SceneOptions options;
+  options.path = ScenePath::kRing;
+  options.num_views = 20;
+  options.num_points = 150;
+  options.noise_px = 1.0;
+  const Scene scene = MakeScene(options);
+  KnownRotationInput input;
+  input.camera = scene.camera;
+  input.cam_from_world = scene.cam_from_world;
+  input.tracks = scene.tracks;
+  WriteKnownRotation(Path("free.txt"), input);
+  for (const auto& [view, rotation] : scene.cam_from_world) input.sigma_rad[view] = 1e-6;
+  WriteKnownRotation(Path("tight.txt"), input);
+  const auto error = [&](const std::string& name, const std::vector<std::string>& more) {
+    const CommandResult result =
+        Rotslam({"solve", Path(name).string(), "--out", Path("out").string()}, more);
+    EXPECT_EQ(result.exit_code, 0) << result.error;
+    return ErrorOf(Path("out"), scene, 0);
+  };
+  const double free = error("free.txt", {});
+  const double held = error("free.txt", {"--rotation-sigma-deg", "0"});
+  const double tight = error("tight.txt", {});
+  EXPECT_LT(held, 0.8 * free);
+  EXPECT_NEAR(tight, held, 0.05 * free);
+  EXPECT_NEAR(error("free.txt", {"--rotation-sigma-deg", "6e-5"}), held, 0.05 * free);
+  EXPECT_NEAR(error("tight.txt", {"--rotation-sigma-deg", "100"}), free, 0.05 * free);
+}
+
+TEST_F(SolveTest, OtherConventionsAreRecognised) {
+  const Scene scene = [] {
+    SceneOptions options;
+    options.num_views = 15;
+    options.num_points = 300;
+    options.noise_px = 0.3;
+    return MakeScene(options);
+  }();
+  KnownRotationInput input;
+  input.camera = scene.camera;
+  input.tracks = scene.tracks;
+  const auto refusal = [&](auto change) {
+    for (const auto& [view, rotation] : scene.cam_from_world) {
+      input.cam_from_world[view] = change(rotation);
+    }
+    WriteKnownRotation(Path("in.txt"), input);
+    const CommandResult result =
+        Rotslam({"solve", Path("in.txt").string(), "--out", Path("out").string(), "--quiet"});
+    EXPECT_EQ(result.exit_code, 1);
+    EXPECT_EQ(Lines(result.error).size(), 1u) << result.error;
+    return result.error;
+  };
+  EXPECT_THAT(refusal([](const Rotation& r) { return r.Inverse(); }),
+              HasSubstr("deg (median), taken for world->camera by 0."));
+  Eigen::Matrix3d body_from_cam;
+  body_from_cam << 0, 0, 1, -1, 0, 0, 0, -1, 0;
+  EXPECT_THAT(refusal([&](const Rotation& r) { return Rotation::FromMatrix(body_from_cam) * r; }),
+              HasSubstr("of a body whose axes -y, -z, x are the camera's x, y, z"));
+}
+
+TEST_F(SolveTest, CasesThatPeopleBring) {
+  if (!fs::exists(Case("solve_ok.txt"))) GTEST_SKIP() << Case("") << " is not here";
+  const auto solve = [&](const std::string& name) {
+    return Rotslam({"solve", Case(name).string(), "--out", Path(name).string()});
+  };
+  const CommandResult ok = solve("solve_ok.txt");
+  ASSERT_EQ(ok.exit_code, 0) << ok.error;
+  const std::string poses = ReadWholeFile(Path("solve_ok.txt") / "keyframes_tum.txt");
+
+  const CommandResult large = solve("solve_ids_over_2_31.txt");
+  ASSERT_EQ(large.exit_code, 0) << large.error;
+  EXPECT_EQ(ReadWholeFile(Path("solve_ids_over_2_31.txt") / "keyframes_tum.txt"), poses);
+  EXPECT_THAT(ReadWholeFile(Path("solve_ids_over_2_31.txt") / "views.csv"),
+              HasSubstr("\n0,3000000000,"));
+  EXPECT_EQ(ReadResiduals(Path("solve_ids_over_2_31.txt") / "residuals.csv")[0].view, "3000000001");
+
+  const CommandResult doubled = solve("solve_duplicated_observation.txt");
+  ASSERT_EQ(doubled.exit_code, 0) << doubled.error;
+  EXPECT_THAT(doubled.error, HasSubstr("first track 0 in view 1: 1 merged"));
+  EXPECT_EQ(ReadWholeFile(Path("solve_duplicated_observation.txt") / "keyframes_tum.txt"), poses);
+
+  const CommandResult two = solve("solve_two_views.txt");
+  ASSERT_EQ(two.exit_code, 0) << two.error;
+  EXPECT_EQ(ReadTrajectory(Path("solve_two_views.txt") / "keyframes_tum.txt").size(), 2u);
+  EXPECT_THAT(two.error, HasSubstr("18 views could not be placed: "));
+
+  const CommandResult inverted = solve("solve_rotations_inverted.txt");
+  EXPECT_EQ(inverted.exit_code, 1);
+  EXPECT_THAT(inverted.error, HasSubstr("taken for world->camera"));
+}
+
+// A view that two points see has no place, and is named.
+TEST_F(SolveTest, NamesWhatHasNoPlace) {
+  Scene scene = Street();
+  int left = 2;
+  for (Track& track : scene.tracks) {
+    std::erase_if(track.observations, [&](const Observation& observation) {
+      return observation.frame == FrameId{5} && left-- <= 0;
+    });
+  }
+  WriteColmapText(Path("model"), scene);
+  const CommandResult result =
+      Rotslam({"solve", Path("model").string(), "--out", Path("out").string()});
+  ASSERT_EQ(result.exit_code, 0) << result.error;
+  EXPECT_THAT(result.error, HasSubstr("1 view could not be placed: 6 (2 observations of tracks)"));
+  EXPECT_EQ(ReadTrajectory(Path("out") / "trajectory_tum.txt").size(), 12u);
+  EXPECT_EQ(ReadTrajectory(Path("out") / "keyframes_tum.txt").size(), 11u);
+  EXPECT_THAT(ReadWholeFile(Path("out") / "poses.csv"), HasSubstr(",unplaced,"));
+}
+
+TEST_F(SolveTest, AColmapModelComesOutAsOne) {
+  const Scene scene = Street();
+  WriteColmapBinary(Path("model"), scene);
+  const CommandResult result =
+      Rotslam({"solve", Path("model").string(), "--out", Path("out").string()});
+  ASSERT_EQ(result.exit_code, 0) << result.error;
+  const ColmapModel before = ReadColmapModel(Path("model"));
+  const ColmapModel after = ReadColmapModel(Path("out") / "sparse/0");
+  EXPECT_EQ(after.image_name, before.image_name);
+  EXPECT_EQ(after.images.size(), before.images.size());
+  EXPECT_GT(after.point_id.size(), 0.9 * static_cast<double>(before.point_id.size()));
+  std::set<std::uint64_t> ids;
+  for (const auto& [track, id] : before.point_id) ids.insert(id);
+  for (const auto& [track, id] : after.point_id) EXPECT_TRUE(ids.contains(id)) << id;
+  for (const auto& [frame, image] : after.images) {
+    EXPECT_EQ(image.keypoints_px, before.images.at(frame).keypoints_px);
+  }
+  CenterMap centers;
+  for (const auto& [frame, center] : after.reconstruction.center_in_world) {
+    centers[FrameId{frame.value - 1}] = center;
+  }
+  const CenterMap& truth = scene.true_center_in_world;
+  EXPECT_LT(CompareCenters(centers, truth, AlignCenters(centers, truth)).max, 0.05);
+}
+
+// Every other image from a camera of its own, with a lens.
+TEST_F(SolveTest, SeveralCamerasGoInAndComeOut) {
+  const Scene scene = Street();
+  Camera other = scene.camera;
+  other.model = CameraModel::kRadtan;
+  other.fx = other.fy = 0.8 * scene.camera.fx;
+  other.distortion[0] = -0.1;
+  WriteColmapText(Path("model"), scene);
+  ColmapModel model = ReadColmapModel(Path("model"));
+  model.cameras[7] = other;
+  for (auto& [frame, image] : model.images) {
+    if (frame.value % 2 == 0) continue;
+    image.camera = 7;
+    for (Eigen::Vector2d& keypoint_px : image.keypoints_px) {
+      const auto bearing = scene.camera.Unproject(keypoint_px - Eigen::Vector2d(0.5, 0.5));
+      keypoint_px = *other.Project(*bearing) + Eigen::Vector2d(0.5, 0.5);
+    }
+  }
+  WriteColmapModel(Path("two"), model, model.reconstruction, ColmapForm::kText);
+  const CommandResult result =
+      Rotslam({"solve", Path("two").string(), "--out", Path("out").string()});
+  ASSERT_EQ(result.exit_code, 0) << result.error;
+  EXPECT_THAT(result.error,
+              AllOf(HasSubstr("the images have 2 cameras"), HasSubstr("model after:  12 images")));
+  EXPECT_LT(ErrorOf(Path("out"), scene, 1), 0.05);
+  const ColmapModel after = ReadColmapModel(Path("out") / "sparse/0");
+  EXPECT_EQ(after.cameras, ReadColmapModel(Path("two")).cameras);
+  EXPECT_LT(FiguresOf(after, after.reconstruction).mean_error_px, 0.6);
+  for (const auto& [frame, image] : after.images)
+    EXPECT_EQ(image.camera, frame.value % 2 == 0 ? 1 : 7);
+}
+
+// What `run` leaves goes into other commands, and so does this.
+TEST_F(SolveTest, OtherCommandsTakeItsFolder) {
+  WriteColmapText(Path("model"), Street());
+  ASSERT_EQ(Rotslam({"solve", Path("model").string(), "--out", Path("out").string(), "--quiet"})
+                .exit_code,
+            0);
+  for (const char* format :
+       {"tum", "kitti", "euroc", "csv", "g2o", "ply", "colmap", "colmap-db", "nerf", "openmvg"}) {
+    const CommandResult exported = Rotslam({"export",
+                                            Path("out").string(),
+                                            "--to",
+                                            format,
+                                            "--out",
+                                            (Path("exported") / format).string()});
+    EXPECT_EQ(exported.exit_code, 0) << format << exported.error;
+  }
+  EXPECT_EQ(ReadColmapModel(Path("exported") / "colmap").image_name.begin()->second, "image0.png");
+  const CommandResult report = Rotslam({"report", Path("out").string()});
+  EXPECT_EQ(report.exit_code, 0) << report.error;
+  const CommandResult plot =
+      Rotslam({"plot", Path("out").string(), "--out", Path("plots").string()});
+  EXPECT_EQ(plot.exit_code, 0) << plot.error;
+  const CommandResult again =
+      Rotslam({"solve", Path("out").string(), "--out", Path("again").string(), "--quiet"});
+  EXPECT_EQ(again.exit_code, 0) << again.error;
 }
 
 TEST_F(SolveTest, SaysInOneLineWhatIsWrong) {

@@ -1,4 +1,5 @@
 """The Python module against the program and against scenes whose truth is known."""
+import ast
 import json
 import os
 import subprocess
@@ -147,8 +148,11 @@ class OnASequence(unittest.TestCase):
         with self.assertRaisesRegex(ValueError, "give read_camera the width and height"):
             rotslam.Odometry(rotslam.read_camera(file))
         self.assertEqual(rotslam.read_camera(file, 320, 240).width, 320)
+        given = rotslam.read_camera(self.sequence / "camera.yaml")
+        scaled = rotslam.read_camera(self.sequence / "camera.yaml", 640, 480)
+        self.assertAlmostEqual(scaled.fx, 2 * given.fx)
         with self.assertRaisesRegex(RuntimeError, "640"):
-            rotslam.read_camera(self.sequence / "camera.yaml", 640, 480)
+            rotslam.read_camera(self.sequence / "camera.yaml", 640, 400)
 
     def test_world_errors_are_runtime_errors(self):
         with self.assertRaisesRegex(RuntimeError, "nowhere"):
@@ -174,6 +178,7 @@ class OptionsAndCameras(unittest.TestCase):
         self.assertIn("a whole number", self.refusal(options={"features": {"max_features": 10**30}}))
         self.assertIn("a whole number", self.refusal(options={"features": {"max_features": True}}))
         self.assertIn('"averaging" is a group', self.refusal(options={"averaging": 3}))
+        self.assertIn('"averagin"', self.refusal(options={"averagin": {}}))
         self.assertIn("must be a dict", self.refusal(options=[1]))
         self.assertIn("threads is 0", self.refusal(threads=0))
 
@@ -270,6 +275,136 @@ class KnownRotations(unittest.TestCase):
         self.assertIn("sigma_rad must be",
                       refusal(cam_from_world, view, track, pixels, sigma_rad=[1]))
         self.assertTrue(refusal(cam_from_world, view + 1, track, pixels))
+
+    def test_adjusts_what_known_rotations_give(self):
+        centers, points, arguments = self.scene(0.5)
+        cam_from_world, view, track, pixels, camera = arguments
+        start = rotslam.solve_known_rotation(*arguments)
+        result = rotslam.refine_bundle(cam_from_world, start["centers"], view, track, pixels, camera,
+                                       rotation_sigma_rad=np.full(7, 1e-6),
+                                       options={"find_covariance": True}, threads=2)
+        self.assertTrue(result["is_usable"], result["message"])
+        # Orientations that are known this well stay.
+        np.testing.assert_allclose(result["cam_from_world"], cam_from_world, atol=1e-5)
+        scale = (np.linalg.norm(centers[6] - centers[0])
+                 / np.linalg.norm(result["centers"][6] - result["centers"][0]))
+        shift = centers[0] - scale * result["centers"][0]
+        np.testing.assert_allclose(scale * result["centers"] + shift, centers, atol=0.02)
+        self.assertEqual(result["points"].shape, (80, 3))
+        self.assertLess(result["median_px"], 0.5)
+        self.assertEqual(result["pose_covariance"][6].shape, (6, 6))
+        held = rotslam.refine_bundle(cam_from_world, start["centers"], view, track, pixels, camera,
+                                     fixed_views={0, 6})
+        np.testing.assert_array_equal(held["centers"][[0, 6]], start["centers"][[0, 6]])
+        # An eighth view from the place of the seventh.
+        again = view == 6
+        shared = rotslam.refine_bundle(
+            np.concatenate([cam_from_world, cam_from_world[6:]]),
+            np.concatenate([start["centers"], start["centers"][6:] + 0.01]),
+            np.concatenate([view, np.full(again.sum(), 7)]),
+            np.concatenate([track, track[again]]), np.concatenate([pixels, pixels[again]]), camera,
+            shared_center={7: 6})
+        self.assertTrue(np.isfinite(shared["centers"]).all())
+        np.testing.assert_array_equal(shared["centers"][7], shared["centers"][6])
+        with self.assertRaisesRegex(ValueError, "nearest one is"):
+            rotslam.refine_bundle(*arguments[:1], start["centers"], *arguments[1:],
+                                  options={"min_angle_degree": 1.0})
+
+
+def turn(x, y, z):
+    """The rotation matrix of a rotation vector."""
+    angle = np.sqrt(x * x + y * y + z * z)
+    if angle == 0:
+        return np.eye(3)
+    a, b, c = x / angle, y / angle, z / angle
+    skew = np.array([[0, -c, b], [c, 0, -a], [-b, a, 0]])
+    return np.eye(3) + np.sin(angle) * skew + (1 - np.cos(angle)) * skew @ skew
+
+
+def quaternion(matrix):
+    """x y z w of a rotation by less than half a turn."""
+    w = np.sqrt(1 + np.trace(matrix)) / 2
+    skew = matrix - matrix.T
+    return np.array([skew[2, 1], skew[0, 2], skew[1, 0], 4 * w * w]) / (4 * w)
+
+
+class Rotations(unittest.TestCase):
+    def test_averages_and_certifies(self):
+        truth = np.array([turn(0.1 * k, 0.05 * k * k, -0.2 * k) for k in range(8)])
+        i, j = np.array([(a, b) for a in range(8) for b in range(a)]).T
+        j_from_i = truth[j] @ truth[i].transpose(0, 2, 1)
+        j_from_i[3] = turn(1, 0, 0) @ j_from_i[3]
+        result = rotslam.average_rotations(i, j, j_from_i, sigma_rad=0.01)
+        found = result["cam_from_world"]
+        relative = found @ found[0].T @ truth[0]
+        np.testing.assert_allclose(relative, truth, atol=1e-5)
+        self.assertEqual(result["num_inliers"], len(i) - 1)
+        self.assertGreater(result["sigmas"][3], 50)
+        np.testing.assert_array_equal(result["component"], 0)
+        certificate = rotslam.certify_rotations(i, j, j_from_i, 1.0 * (result["sigmas"] < 6), found)
+        self.assertLess(certificate["cost"], 1e-9)
+        again = rotslam.average_rotations(i, j, j_from_i, start=truth,
+                                          covariance=np.tile(1e-4 * np.eye(3), (len(i), 1, 1)))
+        np.testing.assert_allclose(again["cam_from_world"], truth, atol=1e-5)
+        for wrong in ({"sigma_rad": 0}, {"options": {"loss_sigma": 3.0}}, {"threads": 0}):
+            with self.assertRaises(ValueError):
+                rotslam.average_rotations(i, j, j_from_i, **wrong)
+
+    def test_aligns_a_sensor(self):
+        times = np.arange(120) / 30
+        at = lambda s: turn(0.3 * np.sin(1.3 * s), 0.2 * np.sin(2.1 * s), 0.1 * np.sin(3 * s))
+        mounting = turn(0.01, -0.02, 0.03)
+        given = np.array([[s + 0.05, *quaternion(at(s).T @ mounting)]
+                          for s in np.arange(0, 4, 0.01)])
+        result = rotslam.fuse_orientations(times, [at(s) for s in times], np.full(119, 1e-5), given,
+                                           options={"use_alignment": True})
+        self.assertAlmostEqual(result["offset_s"], 0.05, places=3)
+        np.testing.assert_allclose(result["cam_from_sensor"], mounting, atol=1e-3)
+        self.assertEqual(set(result["source"]), {"both"})
+        self.assertIsNone(rotslam.fuse_orientations(times, [at(s) for s in times],
+                                                    np.full(119, 1e-5), given + [100, 0, 0, 0, 0]))
+
+
+class Readers(unittest.TestCase):
+    def test_files(self):
+        with tempfile.TemporaryDirectory() as folder:
+            graph = Path(folder) / "graph.txt"
+            graph.write_text("a b 0 0 0 1\nb c 0 0 0.6 0.8 2.0\n")
+            read = rotslam.read_relative_rotations(graph)
+            self.assertEqual(read["ids"], ["a", "b", "c"])
+            np.testing.assert_allclose(read["covariance"][1], np.radians(2) ** 2 * np.eye(3))
+            averaged = rotslam.average_rotations(read["i"], read["j"], read["j_from_i"],
+                                                 covariance=read["covariance"])
+            self.assertEqual(averaged["cam_from_world"].shape, (3, 3, 3))
+            poses = Path(folder) / "poses.txt"
+            poses.write_text("1 2 3 4 0 0 0 1\n2 2 3 4 0 0 0.6 0.8\n")
+            np.testing.assert_allclose(rotslam.read_trajectory(poses)[1], [2, 2, 3, 4, 0, 0, .6, .8])
+            np.testing.assert_allclose(rotslam.read_orientations(poses)[1], [2, 0, 0, .6, .8])
+            problem = Path(folder) / "problem.txt"
+            problem.write_text("rotslam_known_rotation 1\ncamera pinhole 640 480 500 500 320 240 "
+                               "0 0 0 0 0\nviews 2\n7 0 0 0 0 1 0\n9 1 0 0 0 1 0\ntracks 1\n"
+                               "5 9 9 9 2 7 10 20 1 9 30 40 1\n")
+            read = rotslam.read_known_rotation(problem)
+            self.assertEqual(read["names"], ["7", "9"])
+            np.testing.assert_array_equal(read["view"], [0, 1])
+            np.testing.assert_allclose(read["keypoints_px"], [[10, 20], [30, 40]])
+            self.assertEqual(read["camera"].fx, 500)
+            with self.assertRaisesRegex(RuntimeError, "nowhere"):
+                rotslam.read_trajectory(Path(folder) / "nowhere")
+
+    def test_stubs_name_what_there_is(self):
+        stubs = ast.parse(Path(rotslam.__file__).with_name("rotslam.pyi").read_text())
+        for node in stubs.body:
+            if isinstance(node, ast.ClassDef):
+                members = {entry.name for entry in node.body if isinstance(entry, ast.FunctionDef)}
+                self.assertLessEqual(members, set(dir(getattr(rotslam, node.name))), node.name)
+            if isinstance(node, ast.FunctionDef):
+                # pybind11's docstrings begin with the signature.
+                signature = getattr(rotslam, node.name).__doc__.split("\n")[0]
+                for argument in node.args.args:
+                    self.assertIn(argument.arg + ":", signature, node.name)
+        named = {node.name for node in stubs.body if hasattr(node, "name")}
+        self.assertEqual({name for name in dir(rotslam) if not name.startswith("_")}, named)
 
 
 if __name__ == "__main__":

@@ -75,6 +75,21 @@ class Run(unittest.TestCase):
                          list(range(25)))
         self.assertEqual(self.steps[0], ("orientations", 0, 24))
 
+    def test_live_session(self):
+        slam = rotslam.LiveSlam(self.camera, keep_images=True)
+        self.assertIsNone(slam.map())
+        poses = [slam.add(image, timestamp) for image, timestamp in self.frames]
+        self.assertEqual((poses[0].state, poses[0].position), ("starting", None))
+        self.assertEqual(poses[-1].state, "tracking")
+        self.assertEqual(poses[-1].position.shape, (3,))
+        live_map = slam.map()
+        self.assertEqual(live_map.revision, poses[-1].revision)
+        self.assertGreater(len(live_map.points), 100)
+        self.assertEqual(live_map.positions.shape, (len(live_map.keyframes), 3))
+        np.testing.assert_array_equal(slam.finish().trajectory, self.result.trajectory)
+        with self.assertRaises(ValueError):
+            slam.add(None, 1e9)
+
     def test_images_in_memory(self):
         result = rotslam.run(self.frames, self.camera)
         np.testing.assert_array_equal(result.trajectory, self.result.trajectory)
@@ -90,7 +105,7 @@ class Run(unittest.TestCase):
         result = rotslam.run(sequence)
         np.testing.assert_allclose(result.timestamps, self.expected[:12, 0], atol=1e-9)
 
-    def test_without_a_camera_finds_the_focal_length(self):
+    def test_without_a_camera_estimates_the_lens(self):
         bare = self.folder / "bare"
         (self.sequence / "rgb").rename(bare)
         try:

@@ -9,6 +9,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include "tests/apps/chromium.h"
 #include "tests/apps/run_directory.h"
 #include "tests/apps/unknown_readout.h"
 
@@ -18,7 +19,7 @@ namespace {
 namespace fs = std::filesystem;
 using Json = nlohmann::json;
 using testing::HasSubstr;
-using testing::Not;
+using testing::IsEmpty;
 
 // Goes through the page as a person would, and leaves what it has seen in an element.
 constexpr const char* kVisitor = R"js(
@@ -74,13 +75,6 @@ constexpr const char* kVisitor = R"js(
 </script>
 )js";
 
-std::string Chromium() {
-  for (const char* path : {"/usr/bin/chromium", "/usr/bin/chromium-browser"}) {
-    if (fs::exists(path)) return path;
-  }
-  return "";
-}
-
 class ReportPage : public testing::Test {
  protected:
   static void SetUpTestSuite() {
@@ -116,20 +110,13 @@ class ReportPage : public testing::Test {
         folder.Write("visited.html", ReadWholeFile(out / "report.html") + kVisitor);
     const fs::path dom = folder.path() / "dom";
     const fs::path log = folder.path() / "log";
-    const std::string line =
-        "timeout 120 " + Chromium() +
-        " --headless --no-sandbox --disable-gpu --use-angle=swiftshader" +
-        " --enable-unsafe-swiftshader --no-first-run --disable-extensions --disable-dev-shm-usage" +
-        " --enable-logging=stderr --window-size=1400,2400 --virtual-time-budget=3000" +
-        " --user-data-dir=" + Quoted((folder.path() / "profile").string()) + " --dump-dom " +
-        Quoted("file://" + page.string()) + " >" + Quoted(dom.string()) + " 2>" +
-        Quoted(log.string());
+    const std::string line = ChromiumCommand("file://" + page.string(),
+                                             "--window-size=1400,2400 --virtual-time-budget=3000",
+                                             folder.path(),
+                                             dom,
+                                             log);
     EXPECT_EQ(std::system(line.c_str()), 0) << ReadWholeFile(log);
-    for (const std::string& message : Lines(ReadWholeFile(log))) {
-      // The driver remarks that reading pixels, which only this test does, is slow.
-      if (message.find("GL Driver Message") != std::string::npos) continue;
-      EXPECT_THAT(message, Not(HasSubstr("CONSOLE")));
-    }
+    EXPECT_THAT(ConsoleMessages(ReadWholeFile(log)), IsEmpty());
     const std::string text = ReadWholeFile(dom);
     const std::string begin = "<pre id=\"seen\">";
     const std::size_t at = text.find(begin, text.rfind("</footer>"));

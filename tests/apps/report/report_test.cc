@@ -12,6 +12,7 @@
 #include <gtest/gtest.h>
 #include <opencv2/imgcodecs.hpp>
 
+#include "apps/page/camera_angles.h"
 #include "apps/report/figures.h"
 #include "apps/report/page.h"
 #include "apps/report/page_data.h"

@@ -108,7 +108,8 @@ TEST_F(FaultyFrames, UnreadableFramesAtBothEnds) {
   const std::vector<fs::path> images = Images(sequence);
   for (const int frame : {0, 1, kNumFrames - 1}) fs::remove(images[frame]);
   const CommandResult result = Run(sequence);
-  EXPECT_EQ(Lines(result.error).size(), 3u) << result.error;
+  EXPECT_EQ(Lines(result.error).size(), 4u) << result.error;
+  EXPECT_THAT(result.error, HasSubstr("frames 0-1, 23: nothing ties these frames to the map"));
   const Trajectory trajectory = Result(result);
   ASSERT_EQ(trajectory.size(), std::size_t{kNumFrames});
   // The ends take over the nearest orientation.

@@ -36,6 +36,7 @@ Orientations OrientationsOf(const Scene& scene, bool rotation_only) {
           FrameId{before}, frame, rotation * scene.cam_from_world.at(FrameId{before}).Inverse()};
       edge.covariance = 1e-6 * Eigen::Matrix3d::Identity();
       edge.rotation_only = rotation_only;
+      edge.parallax_px = rotation_only ? 0.2 : 20.0;
       edge.num_inliers = 100;
       orientations.graph.AddEdge(edge);
     }
@@ -120,6 +121,13 @@ TEST(BuildKeyframeMap, FindsCentresAndPointsUpToSimilarity) {
             0.5 * LargestTurnErrorDeg(scene.cam_from_world, true_rotations, result.keyframes))
       << "bundle adjustment improves orientations";
   EXPECT_GT(result.map.point_in_world.size(), 300U);
+  const MapBracket& bracket = result.final_bracket;
+  EXPECT_EQ(bracket.num_observations, NumObservations(result.map.tracks));
+  EXPECT_GT(bracket.gamma_low, 0.0);
+  EXPECT_LE(bracket.gamma_low, bracket.gamma_high);
+  EXPECT_LE(bracket.gamma_high, bracket.largest_residual);
+  EXPECT_LT(bracket.largest_residual * scene.camera.MeanFocal(), 6.0 * 0.3)
+      << "six deviations of the noise, far from the bound of the start";
   EXPECT_TRUE(result.cloud.point_in_world.empty()) << "that is BuildMap's";
   using enum SlamStage;
   EXPECT_THAT(observer.begun,
@@ -196,6 +204,23 @@ TEST(BuildKeyframeMap, SaysWhyThereIsNoMap) {
   EXPECT_NE(result.failure, "");
   EXPECT_FALSE(result.rotates_throughout);
   EXPECT_EQ(result.center_in_world.size(), 24U);
+}
+
+// A phone held still: pairs of frames show a baseline of some millimetres, which gives no map.
+TEST(BuildKeyframeMap, IsAtRestWhereTheParallaxIsTheTremorOfAHand) {
+  const Scene scene = Pivot();
+  Orientations orientations = OrientationsOf(scene, false);
+  ViewGraph graph;
+  for (RelativeRotation edge : orientations.graph.edges()) {
+    edge.parallax_px = 0.5;
+    graph.AddEdge(edge);
+  }
+  orientations.graph = graph;
+  orientations.edge_matches.clear();
+  ExpectNoMapOfAPureRotation(BuildFrom(orientations));
+  // With pieces that nothing ties there is something wrong.
+  orientations.breaks = {FrameId{8}};
+  EXPECT_NE(BuildFrom(orientations).failure, "");
 }
 
 // No track goes on from frame 11 to frame 12: two maps, put together by continuity.

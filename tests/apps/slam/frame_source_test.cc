@@ -1,4 +1,4 @@
-#include "apps/slam/frame_source.h"
+#include "apps/slam/input/frame_source.h"
 
 #include <string>
 #include <vector>

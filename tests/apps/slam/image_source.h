@@ -9,7 +9,7 @@
 #include <vector>
 
 #include "apps/simulation/simulation.h"
-#include "apps/slam/frame_source.h"
+#include "apps/slam/input/frame_source.h"
 
 namespace rotslam {
 

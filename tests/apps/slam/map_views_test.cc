@@ -38,8 +38,9 @@ class MapViewsTest : public testing::Test {
 
   MapViews Read(ImageProvider& images, const std::set<FrameId>& frames) {
     problems_.clear();
-    return ReadMapViews(
-        images, frames, [&](const std::string& problem) { problems_.push_back(problem); });
+    return ReadMapViews(images, frames, Orientations(), [&](const std::string& problem) {
+      problems_.push_back(problem);
+    });
   }
 
   const TemporaryFolder folder_;

@@ -4,7 +4,8 @@
 #include <ceres/rotation.h>
 #include <gtest/gtest.h>
 
-#include "ba/cost/lens.h"
+#include "ba/cost/lens_prior.h"
+#include "ba/cost/rotation_prior.h"
 #include "rotodom/types/rotation.h"
 #include "tests/ba/ba_scene.h"
 
@@ -103,9 +104,13 @@ class FollowingCost final : public ceres::CostFunction {
     if (form_.camera != CameraLayout::kCenter) {
       rotation_.Turn(Eigen::Vector3d::Map(parameters[0]));
     }
-    if (form_.moves_lens) {
-      const double* const lens = parameters[parameter_block_sizes().size() - 1];
-      camera_ = WithLens(calibrated_, LensParameters::Map(lens));
+    if (form_.num_lens_blocks > 0) {
+      LensParameters lens = LensOf(calibrated_, calibrated_);
+      const std::size_t first = parameter_block_sizes().size() - form_.num_lens_blocks;
+      for (int k = 0; k < form_.num_lens_blocks; ++k) {
+        lens.segment<kLensBlockSize>(k * kLensBlockSize) = LensBlock::Map(parameters[first + k]);
+      }
+      camera_ = WithLens(calibrated_, lens);
     }
     return cost_.Evaluate(parameters, residuals, jacobians);
   }
@@ -126,6 +131,7 @@ TEST_P(ReprojectionForEveryCamera, JacobiansOfCostsEqualCentralDifferences) {
   pose.insert(pose.end(), center.begin(), center.end());
   const std::vector<double> point = {1.1, -0.7, 4.0};
   const std::vector<double> lens = {1.02, 0.99, 0.01, -0.02, -0.05, 0.03};
+  const std::vector<double> rest = {0.002, -0.003, 0.01, 0.0, 0.0, 0.0};
   using Blocks = std::vector<std::vector<double>>;
   const struct {
     CameraLayout layout;
@@ -138,12 +144,13 @@ TEST_P(ReprojectionForEveryCamera, JacobiansOfCostsEqualCentralDifferences) {
       {CameraLayout::kApart, true, {turn}},
       {CameraLayout::kCenter, false, {center}},
   };
-  for (const bool moves_lens : {false, true}) {
+  for (const int num_lens_blocks : {0, 1, 2}) {
     for (const auto& [layout, at_infinity, camera_blocks] : cases) {
       Blocks blocks = camera_blocks;
       blocks.push_back(point);
-      if (moves_lens) blocks.push_back(lens);
-      ExpectJacobiansAgree(FollowingCost(camera, {layout, at_infinity, moves_lens}), blocks);
+      if (num_lens_blocks > 0) blocks.push_back(lens);
+      if (num_lens_blocks > 1) blocks.push_back(rest);
+      ExpectJacobiansAgree(FollowingCost(camera, {layout, at_infinity, num_lens_blocks}), blocks);
     }
   }
 }
@@ -218,9 +225,9 @@ TEST_P(ReprojectionForEveryCamera, JacobiansEqualAutomaticDerivatives) {
 
 TEST(LensPriorCost, IsZeroAtWhatIsExpectedAndItsJacobianEqualsCentralDifferences) {
   const double expected[6] = {1.0, 1.0, 0.01, -0.01, -0.1, 0.02};
-  LensParameters sigmas;
+  LensBlock sigmas;
   sigmas << 0.003, 0.001, 0.002, 0.002, 0.005, 0.1;
-  const LensPriorCost cost(Eigen::Map<const LensParameters>(expected), sigmas);
+  const LensPriorCost cost(Eigen::Map<const LensBlock>(expected), sigmas);
   const double* parameters[1] = {expected};
   double residuals[6];
   ASSERT_TRUE(cost.Evaluate(parameters, residuals, nullptr));
@@ -233,12 +240,12 @@ TEST_P(ReprojectionForEveryCamera, LensJacobianEqualsCentralDifferences) {
   const Eigen::Vector3d points[] = {
       {1.1, -0.7, 4.0}, {0.0, 0.0, 2.0}, {-3.0, 1.0, 4.0}, {1e-9, 1e-9, 1.0}};
   for (const double first : {-0.1, 0.3, 0.8}) {
-    LensParameters lens;
-    lens << 1.02, 0.99, 0.01, -0.02, first, 0.03;
+    LensParameters lens = LensOf(calibrated, calibrated);
+    lens.head<6>() << 1.02, 0.99, 0.01, -0.02, first, 0.03;
     const Camera camera = WithLens(calibrated, lens);
     for (const Eigen::Vector3d& point : points) {
       const auto J = LensJacobian(camera, calibrated, point, camera.Project(point).value());
-      for (int k = 0; k < 6; ++k) {
+      for (int k = 0; k < kLensSize; ++k) {
         const LensParameters step = 1e-6 * LensParameters::Unit(k);
         const Eigen::Vector2d difference =
             (WithLens(calibrated, lens + step).Project(point).value() -
@@ -255,11 +262,12 @@ TEST_P(ReprojectionForEveryCamera, WithLensUndoesLensOfAndHoldsWhatAModelDoesNot
   const Camera camera = BaCamera(GetParam());
   const LensParameters calibrated = LensOf(camera, camera);
   EXPECT_EQ(WithLens(camera, calibrated), camera);
-  LensParameters lens;
-  lens << 1.01, 0.99, 0.003, -0.004, 0.7, 0.02;
+  LensParameters lens = LensParameters::Zero();
+  lens.head<9>() << 1.01, 0.99, 0.003, -0.004, 0.7, 0.02, 0.001, -0.002, 0.01;
   const Camera moved = WithLens(camera, lens);
   EXPECT_FALSE(moved.Problem());
-  if (NumLensCoefficients(GetParam()) == 1) lens[5] = 0.0;
+  const int num_coefficients = NumLensCoefficients(GetParam());
+  lens.tail(kLensSize - kLensDistortion - num_coefficients).setZero();
   EXPECT_LT((LensOf(moved, camera) - lens).norm(), 1e-14);
   for (std::size_t k = NumLensCoefficients(GetParam()); k < camera.distortion.size(); ++k) {
     EXPECT_EQ(moved.distortion[k], camera.distortion[k]) << "coefficient " << k;
@@ -272,7 +280,7 @@ TEST(LensJacobian, OfASmallFieldOfViewIsThatOfItsSeries) {
   // d(r) = r + w^2 (r / 12 - r^3 / 3) + O(w^4); r is 1 here.
   for (const double w : {0.0, 1e-9, 5e-5, 6e-5, 9e-5, 1e-3}) {
     camera.distortion[0] = w;
-    const Eigen::Matrix<double, 2, 6> J =
+    const Eigen::Matrix<double, 2, kLensSize> J =
         LensJacobian(camera, camera, point, camera.Project(point).value());
     EXPECT_NEAR(J(0, 4), -0.5 * w * 0.6 * camera.fx, 1e-5 * w * camera.fx) << w;
     EXPECT_NEAR(J(1, 4), 0.5 * w * 0.8 * camera.fy, 1e-5 * w * camera.fy) << w;
@@ -282,8 +290,8 @@ TEST(LensJacobian, OfASmallFieldOfViewIsThatOfItsSeries) {
 TEST(WithLens, UndoesLensOfAndTurnsAPinholeIntoRadtanOnlyWhereItBends) {
   const Camera pinhole = BaCamera();
   EXPECT_EQ(WithLens(pinhole, LensOf(pinhole, pinhole)), pinhole);
-  LensParameters lens;
-  lens << 1.01, 0.99, 0.003, -0.004, 0.02, -0.01;
+  LensParameters lens = LensParameters::Zero();
+  lens.head<9>() << 1.01, 0.99, 0.003, -0.004, 0.02, -0.01, 0.001, -0.002, 0.003;
   const Camera bent = WithLens(pinhole, lens);
   EXPECT_EQ(bent.model, CameraModel::kRadtan);
   EXPECT_FALSE(bent.Problem());
@@ -301,6 +309,36 @@ TEST(ScaleAnchorCost, IsZeroAtTheStartAndItsJacobianEqualsCentralDifferences) {
   ExpectJacobiansAgree(
       ScaleAnchorCost({1.0, 2.0, 3.0}, {4.0, 6.0, 3.5}, 100.0, CameraLayout::kPose),
       {{0.1, 0.2, 0.3, 3.0, 5.0, 2.0}});
+}
+
+TEST(RotationPriorCost, IsTheAngleInSigmasAndItsJacobianEqualsCentralDifferences) {
+  const Rotation given = Rotation::Exp({0.2, -0.7, 1.1});
+  const Rotation start = Rotation::Exp({0.03, 0.02, -0.04}) * given;
+  const double sigma_rad = 0.01;
+  const RotationPriorCost cost(start, given, sigma_rad);
+  const auto residual_at = [&](const Eigen::Vector3d& turn) {
+    Eigen::Vector3d residual;
+    const double* blocks[] = {turn.data()};
+    EXPECT_TRUE(cost.Evaluate(blocks, residual.data(), nullptr));
+    return residual;
+  };
+  EXPECT_NEAR(residual_at(Eigen::Vector3d::Zero()).norm(),
+              (start * given.Inverse()).Angle() / sigma_rad,
+              1e-9);
+  EXPECT_LT(residual_at((given * start.Inverse()).Log()).norm(), 1e-9);
+  const Eigen::Vector3d turn(0.1, -0.3, 0.2);
+  Eigen::Vector3d residual;
+  Eigen::Matrix<double, 3, 3, Eigen::RowMajor> J;
+  const double* blocks[] = {turn.data()};
+  double* jacobians[] = {J.data()};
+  ASSERT_TRUE(cost.Evaluate(blocks, residual.data(), jacobians));
+  constexpr double kStep = 1e-6;
+  for (int k = 0; k < 3; ++k) {
+    const Eigen::Vector3d step = kStep * Eigen::Vector3d::Unit(k);
+    const Eigen::Vector3d difference =
+        (residual_at(turn + step) - residual_at(turn - step)) / (2.0 * kStep);
+    EXPECT_LT((J.col(k) - difference).norm(), 1e-7 * J.norm()) << k;
+  }
 }
 
 TEST(LeftJacobian, EqualsCentralDifferences) {

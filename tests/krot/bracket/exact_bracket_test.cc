@@ -1,9 +1,13 @@
+#include <iterator>
 #include <memory>
+#include <set>
+#include <utility>
 
 #include <glpk.h>
 #include <gtest/gtest.h>
 
 #include "krot/bracket/bisection.h"
+#include "krot/known_rotation.h"
 #include "krot/structure/minimax_lp.h"
 #include "tests/krot/problem_from_scene.h"
 
@@ -98,6 +102,45 @@ TEST(MinimiseMaxResidual, GlpkBracketsHoldInExactArithmetic) {
   options.method = BisectionMethod::kPrograms;
   options.lp.engine = LpEngine::kGlpk;
   ExpectTrueBrackets(500, options);
+}
+
+// The whole solver: what it keeps has no smaller largest residual than it says, and its own centres
+// and points attain what it says.
+TEST(SolveKnownRotation, BracketOfWhatItKeepsHoldsInExactArithmetic) {
+  for (int instance = 0; instance < 5; ++instance) {
+    SceneOptions scene_options;
+    scene_options.seed = static_cast<std::uint64_t>(instance) + 1;
+    scene_options.num_views = 4;
+    scene_options.num_points = 30;
+    scene_options.noise_px = 1.0;
+    Scene scene = MakeScene(scene_options);
+    KrotOptions options;
+    options.start = KrotStart::kBisection;
+    const KrotSolution solution =
+        SolveKnownRotation(scene.cam_from_world, scene.tracks, scene.camera, options);
+    ASSERT_EQ(solution.status, KrotStatus::kConverged) << solution.message;
+    std::set<std::pair<TrackId, FrameId>> removed;
+    for (const RemovedObservation& one : solution.removed) removed.insert({one.track, one.frame});
+    std::erase_if(scene.tracks,
+                  [&](const Track& track) { return !solution.point_in_world.contains(track.id); });
+    for (Track& track : scene.tracks) {
+      std::erase_if(track.observations, [&](const Observation& observation) {
+        return removed.contains({track.id, observation.frame});
+      });
+    }
+    const MinimaxProblem problem = ProblemFromScene(scene);
+    ASSERT_EQ(std::ssize(problem.observations), solution.num_bracket_observations);
+    EXPECT_GT(ExactSlack(problem, solution.gamma_low), 0.0) << instance;
+    EXPECT_LT(ExactSlack(problem, solution.gamma_high * (1.0 + 1e-9)), 1e-9) << instance;
+    MinimaxStructure structure;
+    for (const auto& [view, rotation] : scene.cam_from_world) {
+      structure.center_in_world.push_back(solution.center_in_world.at(view));
+    }
+    for (const Track& track : scene.tracks) {
+      structure.point_in_world.push_back(solution.point_in_world.at(track.id));
+    }
+    EXPECT_NEAR(MaxBoxResidual(problem, structure), solution.gamma_high, 1e-9);
+  }
 }
 
 }  // namespace

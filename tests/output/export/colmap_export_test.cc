@@ -168,7 +168,7 @@ TEST(ColmapDatabase, HoldsTheModelsImagesAndKeypoints) {
   const TemporaryFolder folder;
   const fs::path file = folder.path() / "database.db";
   const RunMap map = MapOfScene(ExportScene());
-  WriteColmapDatabase(file, map);
+  WriteColmapDatabase(file, map, {});
   EXPECT_EQ(Query(file, "PRAGMA user_version"), (std::vector<Row>{{"3800"}}));
   const std::vector<Row> cameras = Query(
       file, "SELECT camera_id, model, width, height, prior_focal_length, params FROM cameras");
@@ -204,7 +204,7 @@ TEST(ColmapDatabase, ItsMatchesAreTheTracks) {
   const TemporaryFolder folder;
   const fs::path file = folder.path() / "database.db";
   const RunMap map = MapOfScene(ExportScene());
-  WriteColmapDatabase(file, map);
+  WriteColmapDatabase(file, map, {});
   const auto keypoints = ListKeypoints(map);
   const std::vector<Row> rows = Query(file, "SELECT pair_id, rows, data FROM matches");
   EXPECT_EQ(rows.size(), 36u);  // every two of nine frames
@@ -247,7 +247,7 @@ TEST(ColmapDatabase, ItsGeometriesAreThoseOfThePoses) {
       seen.keypoint_px = map.camera.Project(seen.bearing).value();
     }
   }
-  WriteColmapDatabase(file, map);
+  WriteColmapDatabase(file, map, {});
   const auto keypoints = ListKeypoints(map);
   const PairTable table = ReadPairs(file);
   const auto number = [&](int k) { return ColmapImageId(map.frames[k].id); };
@@ -311,7 +311,7 @@ TEST(ColmapDatabase, NoGeometryHoldsMatchesThatTheirPointRefutes) {
   ASSERT_NE(entry, map.tracks.end());
   entry->fits.front() = false;
   const int refuted = static_cast<int>(entry - map.tracks.begin());
-  WriteColmapDatabase(file, map);
+  WriteColmapDatabase(file, map, {});
   const auto keypoints = ListKeypoints(map);
   // Matches of the track, and those of them with its first observation.
   const auto count = [&](const std::string& table) {
@@ -336,18 +336,82 @@ TEST(ColmapDatabase, NoGeometryHoldsMatchesThatTheirPointRefutes) {
   EXPECT_EQ(count("two_view_geometries"), std::pair((num_seen - 1) * (num_seen - 2) / 2, 0));
 }
 
+// Keypoints 1, 2 ... of the first two frames, which no track has.
+ViewGraphMatches NewMatches(const RunMap& map, int count) {
+  ViewGraphMatches matches;
+  MatchedPair& pair = matches.pairs.emplace_back();
+  pair.i = map.frames[0].id;
+  pair.j = map.frames[1].id;
+  for (int k = 0; k < count; ++k) {
+    const Eigen::Vector2d pixel(10.25 + 3 * k, 20.5 + k);
+    const Eigen::Vector3d bearing = map.camera.Unproject(pixel).value();
+    const Rotation turn = map.frames[1].cam_from_world * map.frames[0].cam_from_world.Inverse();
+    matches.keypoints_px[pair.i].emplace_back(pixel.cast<float>());
+    matches.keypoints_px[pair.j].emplace_back(map.camera.Project(turn * bearing)->cast<float>());
+    pair.matches.push_back({k, k});
+  }
+  return matches;
+}
+
+TEST(ColmapDatabase, HasTheMatchesOfTheViewGraphThatBecameNoTracks) {
+  const TemporaryFolder folder;
+  const fs::path file = folder.path() / "database.db";
+  RunMap map = MapOfScene(ExportScene());
+  map.tracks.clear();
+  map.frames[1].center_in_world = map.frames[0].center_in_world;
+  const ViewGraphMatches matches = NewMatches(map, 20);
+  AddKeypoints(matches, map);
+  WriteColmapDatabase(file, map, matches);
+  const PairTable table = ReadPairs(file);
+  ASSERT_EQ(table.size(), 1u);
+  const auto& [pair, row] = *table.begin();
+  EXPECT_EQ(pair, std::pair(ColmapImageId(map.frames[0].id), ColmapImageId(map.frames[1].id)));
+  EXPECT_EQ(row.rows, 20);
+  EXPECT_EQ(row.config, 5);  // PANORAMIC
+  const std::vector<Row> keypoints = Query(file, "SELECT rows FROM keypoints ORDER BY image_id");
+  EXPECT_EQ(keypoints[0][0], "20");
+  EXPECT_EQ(keypoints[2][0], "0");
+  // The model counts the same keypoints.
+  WriteColmapModel(folder.path() / "sparse", map, ColmapForm::kText);
+  EXPECT_EQ(ListKeypoints(map).at(map.frames[0].id).size(), 20u);
+}
+
+TEST(ColmapDatabase, TakesAMatchOfATrackOnce) {
+  const TemporaryFolder folder;
+  RunMap map = MapOfScene(ExportScene());
+  ViewGraphMatches matches;
+  MatchedPair& pair = matches.pairs.emplace_back();
+  pair.i = map.frames[0].id;
+  pair.j = map.frames[1].id;
+  for (const MapTrack& entry : map.tracks) {
+    const auto& seen = entry.track.observations;
+    if (seen.size() < 2 || seen[0].frame != pair.i || seen[1].frame != pair.j) continue;
+    const int number = static_cast<int>(pair.matches.size());
+    matches.keypoints_px[pair.i].emplace_back(seen[0].keypoint_px.cast<float>());
+    matches.keypoints_px[pair.j].emplace_back(seen[1].keypoint_px.cast<float>());
+    pair.matches.push_back({number, number});
+  }
+  ASSERT_GT(pair.matches.size(), 50u);
+  AddKeypoints(matches, map);
+  WriteColmapDatabase(folder.path() / "without.db", map, {});
+  WriteColmapDatabase(folder.path() / "with.db", map, matches);
+  const std::string rows = "SELECT pair_id, rows FROM matches ORDER BY pair_id";
+  EXPECT_EQ(Query(folder.path() / "with.db", rows), Query(folder.path() / "without.db", rows));
+}
+
 TEST(ColmapDatabase, IsTheSameFileEveryTimeAndReplacesAnOlderOne) {
   const TemporaryFolder folder;
   const RunMap map = MapOfScene(ExportScene());
   folder.Write("b.db", "an older file");
-  WriteColmapDatabase(folder.path() / "a.db", map);
-  WriteColmapDatabase(folder.path() / "b.db", map);
+  WriteColmapDatabase(folder.path() / "a.db", map, {});
+  WriteColmapDatabase(folder.path() / "b.db", map, {});
   EXPECT_EQ(ReadWholeFile(folder.path() / "a.db"), ReadWholeFile(folder.path() / "b.db"));
-  EXPECT_THAT(RuntimeErrorOf([&] { WriteColmapDatabase(folder.path() / "no" / "a.db", map); }),
+  EXPECT_THAT(RuntimeErrorOf([&] { WriteColmapDatabase(folder.path() / "no" / "a.db", map, {}); }),
               HasSubstr("a.db: cannot write the file"));
   ColmapDatabaseOptions options;
   options.min_matches = 0;
-  EXPECT_THROW(WriteColmapDatabase(folder.path() / "c.db", map, options), std::invalid_argument);
+  EXPECT_THROW(WriteColmapDatabase(folder.path() / "c.db", map, {}, options),
+               std::invalid_argument);
 }
 
 }  // namespace

@@ -1,15 +1,20 @@
 // Formats for other programs, read back.
 
+#include <algorithm>
+#include <array>
 #include <cmath>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 #include <nlohmann/json.hpp>
 
+#include "output/export/lens_fit.h"
 #include "output/export/nerf.h"
 #include "output/export/openmvg.h"
+#include "output/export/scene_box.h"
 #include "output/map/map_keypoints.h"
 #include "output/trajectory/trajectory.h"
 #include "rotodom/types/text_file.h"
@@ -64,56 +69,200 @@ TEST(NerfTransforms, ShowThePointsWhereTheImagesDo) {
   }
 }
 
-TEST(NerfTransforms, NameEveryLens) {
+// As instant-ngp reads a lens (nerf_loader.cu, read_lens): four numbers, the last key given wins.
+std::array<double, 4> LensOfInstantNgp(const nlohmann::json& json) {
+  std::array<double, 4> parameters = {};
+  const std::vector<std::pair<const char*, int>> keys = {
+      {"k1", 0}, {"k2", 1}, {"k3", 2}, {"k4", 3}, {"p1", 2}, {"p2", 3}};
+  for (const auto& [key, position] : keys) {
+    if (json.contains(key)) parameters[position] = json[key];
+  }
+  return parameters;
+}
+
+// The camera that a reader gets from a file.
+Camera CameraOfReader(const nlohmann::json& json, bool is_instant_ngp) {
+  Camera camera;
+  camera.width = json["w"];
+  camera.height = json["h"];
+  camera.fx = json["fl_x"];
+  camera.fy = json["fl_y"];
+  camera.cx = json["cx"].get<double>() - 0.5;
+  camera.cy = json["cy"].get<double>() - 0.5;
+  const bool is_fisheye = json["is_fisheye"];
+  EXPECT_EQ(json["camera_model"], is_fisheye ? "OPENCV_FISHEYE" : "OPENCV");
+  camera.model = is_fisheye ? CameraModel::kEquidistant : CameraModel::kRadtan;
+  if (is_instant_ngp) {
+    const std::array<double, 4> parameters = LensOfInstantNgp(json);
+    std::copy(parameters.begin(), parameters.end(), camera.distortion.begin());
+    return camera;
+  }
+  const auto number = [&](const char* key) { return json.value(key, 0.0); };
+  if (is_fisheye) {
+    camera.distortion = {number("k1"), number("k2"), number("k3"), number("k4")};
+  } else {
+    EXPECT_EQ(number("k4"), 0.0);  // nerfstudio refuses to undistort such images
+    camera.distortion = {number("k1"), number("k2"), number("p1"), number("p2"), number("k3")};
+  }
+  return camera;
+}
+
+// The largest distance between what two cameras make of a pixel's ray, over the image.
+double LargestDistancePx(const Camera& a, const Camera& b) {
+  double largest = 0.0;
+  for (int x = 0; x <= a.width; x += a.width / 20) {
+    for (int y = 0; y <= a.height; y += a.height / 20) {
+      const Eigen::Vector2d pixel(std::min(x, a.width - 1), std::min(y, a.height - 1));
+      const auto bearing = a.Unproject(pixel);
+      if (!bearing) continue;
+      const auto other = b.Project(*bearing);
+      largest = std::max(largest, other ? (*other - pixel).norm() : 1e9);
+    }
+  }
+  return largest;
+}
+
+struct LensCase {
+  CameraModel model;
+  std::array<double, 8> distortion;
+  double both_px;        // what a file for both readers may leave, at most
+  double nerfstudio_px;  // and one for nerfstudio
+  bool is_refitted;      // for both
+};
+
+TEST(NerfTransforms, EveryReaderGetsTheLens) {
   const TemporaryFolder folder;
   const fs::path file = folder.path() / "transforms.json";
   RunMap map = MapOfScene(ExportScene());
-  map.camera.distortion = {1.0, 2.0, 3.0, 4.0, 5.0};
-  map.camera.model = CameraModel::kRadtan;
-  WriteNerfTransforms(file, map, "/far/away");
-  nlohmann::json json = ReadJson(file);
-  EXPECT_EQ(json["p1"], 3.0);
-  EXPECT_EQ(json["p2"], 4.0);
-  EXPECT_EQ(json["k3"], 5.0);
-  map.camera.distortion[4] = 0.0;
-  map.camera.model = CameraModel::kEquidistant;
-  WriteNerfTransforms(file, map, "/far/away");
-  json = ReadJson(file);
-  EXPECT_EQ(json["camera_model"], "OPENCV_FISHEYE");
-  EXPECT_EQ(json["is_fisheye"], true);
-  EXPECT_EQ(json["k3"], 3.0);
-  EXPECT_EQ(json["k4"], 4.0);
+  map.camera.fx = 1000.0;
+  map.camera.fy = 1010.0;
+  const std::vector<LensCase> cases = {
+      {CameraModel::kPinhole, {}, 1e-9, 1e-9, false},
+      {CameraModel::kRadtan, {-0.2, 0.05, 1e-3, -2e-3}, 1e-9, 1e-9, false},
+      {CameraModel::kRadtan, {-0.25, 0.08, 1e-3, -2e-3, -0.01}, 2.0, 1e-9, true},
+      {CameraModel::kEquidistant, {0.01, -0.02, 0.003, -4e-4}, 1e-9, 1e-9, false},
+      {CameraModel::kRational, {-0.2, 0.05, 1e-3, -2e-3}, 1e-9, 1e-9, false},
+      {CameraModel::kRational, {0.3, 0.1, 1e-3, -1e-3, 0.0, 0.5, 0.1, 0.01}, 2.0, 1.0, true},
+      {CameraModel::kFov, {0.9}, 1.0, 1.0, true}};
+  for (const LensCase& lens : cases) {
+    map.camera.model = lens.model;
+    map.camera.distortion = lens.distortion;
+    ASSERT_FALSE(map.camera.Problem().has_value());
+    const auto notes = WriteNerfTransforms(file, map, "/far/away");
+    const nlohmann::json both = ReadJson(file);
+    EXPECT_FALSE(both["is_fisheye"] == false && both.contains("k3"));
+    for (const bool is_instant_ngp : {false, true}) {
+      EXPECT_LT(LargestDistancePx(map.camera, CameraOfReader(both, is_instant_ngp)), lens.both_px)
+          << Describe(map.camera);
+    }
+    EXPECT_EQ(notes.empty(), !lens.is_refitted) << Describe(map.camera);
+    for (const std::string& note : notes) {
+      EXPECT_THAT(note, testing::HasSubstr("px root mean square"));
+    }
+    WriteNerfTransforms(file, map, "/far/away", NerfReader::kNerfstudio);
+    EXPECT_LT(LargestDistancePx(map.camera, CameraOfReader(ReadJson(file), false)),
+              lens.nerfstudio_px)
+        << Describe(map.camera);
+  }
 }
 
-TEST(Exports, RefuseALensThatTheOtherSystemHasNoModelOf) {
+TEST(NerfTransforms, HaveTheSceneInTheBoxAndThePointsBeside) {
+  const TemporaryFolder folder;
+  const RunMap map = MapOfScene(ExportScene());
+  EXPECT_TRUE(WriteNerfTransforms(folder.path() / "scene.json", map, "/images").empty());
+  const nlohmann::json json = ReadJson(folder.path() / "scene.json");
+  EXPECT_EQ(json["applied_transform"], nlohmann::json::parse("[[1,0,0,0],[0,1,0,0],[0,0,1,0]]"));
+  const double scale = json["scale"];
+  const int aabb_scale = json["aabb_scale"];
+  const Eigen::Vector3d offset(json["offset"][0], json["offset"][1], json["offset"][2]);
+  EXPECT_EQ(aabb_scale & (aabb_scale - 1), 0);
+  const auto is_inside = [&](const Eigen::Vector3d& position, double side) {
+    return ((scale * position + offset).array() - 0.5).abs().maxCoeff() < 0.5 * side;
+  };
+  for (const MapFrame& frame : map.frames) EXPECT_TRUE(is_inside(frame.center_in_world, 1.0));
+  int num_points = 0;
+  for (const MapTrack& entry : map.tracks) {
+    if (!HasPoint(entry)) continue;
+    ++num_points;
+    EXPECT_TRUE(is_inside(*entry.point_in_world, aabb_scale));
+  }
+  EXPECT_EQ(json["ply_file_path"], "scene_points.ply");
+  const std::string ply = ReadWholeFile(folder.path() / "scene_points.ply");
+  EXPECT_THAT(ply, testing::HasSubstr("element vertex " + std::to_string(num_points) + "\n"));
+}
+
+TEST(NerfTransforms, OfAPureRotationHaveNoPoints) {
+  const TemporaryFolder folder;
+  RunMap map = MapOfScene(ExportScene());
+  map.tracks.clear();
+  for (MapFrame& frame : map.frames) frame.center_in_world.setZero();
+  EXPECT_TRUE(WriteNerfTransforms(folder.path() / "transforms.json", map, "/images").empty());
+  const nlohmann::json json = ReadJson(folder.path() / "transforms.json");
+  EXPECT_FALSE(json.contains("ply_file_path"));
+  EXPECT_FALSE(fs::exists(folder.path() / "transforms_points.ply"));
+  EXPECT_EQ(json["aabb_scale"], 1);
+}
+
+TEST(SceneBox, KeepsFarPointsAndGrowsForThem) {
+  std::vector<Eigen::Vector3d> centers;
+  std::vector<Eigen::Vector3d> points;
+  for (int k = 0; k < 100; ++k) {
+    centers.emplace_back(5.0 + 0.01 * k, 0.0, 0.0);
+    points.emplace_back(5.0 + 0.02 * k, 1.0 - 0.02 * k, k < 90 ? 2.0 : 2.0 + 5.0 * (k - 90));
+  }
+  const SceneBox box = ChooseSceneBox(centers, points);
+  EXPECT_EQ(box.num_outside, 0);
+  EXPECT_GE(box.aabb_scale, 2);
+  EXPECT_LE(box.aabb_scale, 128);
+  // One that no box can hold with the rest stays outside; two of a hundred do not.
+  points.back().z() = 1e6;
+  const SceneBox without = ChooseSceneBox(centers, points);
+  EXPECT_EQ(without.num_outside, 1);
+  EXPECT_EQ(without.aabb_scale, 128);
+  points.front().z() = 1e6;
+  const SceneBox with_one = ChooseSceneBox(centers, points);
+  EXPECT_EQ(with_one.num_outside, 0);
+  EXPECT_LT(with_one.scale, 1e-3);
+  EXPECT_EQ(ChooseSceneBox({}, {}).aabb_scale, 1);
+}
+
+TEST(LensFit, IsExactWhereTheModelHasTheLens) {
+  Camera camera = ExportScene().camera;
+  camera.model = CameraModel::kRational;
+  camera.distortion = {-0.2, 0.05, 1e-3, -2e-3, 0.01};
+  LensFit fit = FitLens(camera, CameraModel::kRadtan, 5);
+  EXPECT_LT(fit.largest_px, 1e-6);
+  EXPECT_NEAR(fit.camera.distortion[4], 0.01, 1e-6);
+  // From a start without distortion.
+  camera.model = CameraModel::kEquidistant;
+  camera.distortion = {0.05, -0.02, 0.003, -4e-4};
+  fit = FitLens(camera, CameraModel::kEquidistant, 4);
+  EXPECT_LT(fit.largest_px, 1e-6);
+  // Two coefficients of another model cannot.
+  fit = FitLens(camera, CameraModel::kRadtan, 2);
+  EXPECT_GT(fit.largest_px, 1e-3);
+  EXPECT_LE(fit.rms_px, fit.largest_px);
+}
+
+TEST(OpenMvg, RefusesALensThatItHasNoModelOf) {
   const TemporaryFolder folder;
   const fs::path file = folder.path() / "out.json";
   RunMap map = MapOfScene(ExportScene());
-  const auto complaints = [&] {
-    return std::vector<std::string>{
-        RuntimeErrorOf([&] { WriteNerfTransforms(file, map, "/images"); }),
-        RuntimeErrorOf([&] { WriteOpenMvg(file, map, "/images"); })};
-  };
   map.camera.model = CameraModel::kRational;
   map.camera.distortion = {0.3, 0.1, 0.0, 0.0, 0.0, 0.0, 0.2, 0.0};
-  for (const std::string& complaint : complaints()) {
-    EXPECT_THAT(complaint, testing::HasSubstr("out.json: is not written: "));
-    EXPECT_THAT(complaint, testing::HasSubstr("no camera model for a rational lens (k4 k5 k6)"));
-    EXPECT_THAT(complaint, testing::HasSubstr("export --to colmap"));
-    EXPECT_EQ(complaint.find('\n'), std::string::npos);
-  }
+  const std::string complaint = RuntimeErrorOf([&] { WriteOpenMvg(file, map, "/images"); });
+  EXPECT_THAT(complaint, testing::HasSubstr("out.json: is not written: "));
+  EXPECT_THAT(complaint, testing::HasSubstr("no camera model for a rational lens (k4 k5 k6)"));
+  EXPECT_THAT(complaint, testing::HasSubstr("--undistort"));
+  EXPECT_EQ(complaint.find('\n'), std::string::npos);
   map.camera.model = CameraModel::kFov;
   map.camera.distortion = {0.9};
-  for (const std::string& complaint : complaints()) {
-    EXPECT_THAT(complaint, testing::HasSubstr("no camera model for a FOV lens (w)"));
-  }
+  EXPECT_THAT(RuntimeErrorOf([&] { WriteOpenMvg(file, map, "/images"); }),
+              testing::HasSubstr("no camera model for a FOV lens (w)"));
   EXPECT_FALSE(fs::exists(file));
   // Without a denominator it is a radtan lens.
   map.camera.model = CameraModel::kRational;
   map.camera.distortion = {1.0, 2.0, 3.0, 4.0, 5.0};
-  WriteNerfTransforms(file, map, "/images");
-  EXPECT_EQ(ReadJson(file)["k3"], 5.0);
-  EXPECT_EQ(ReadJson(file)["p1"], 3.0);
   WriteOpenMvg(file, map, "/images");
   EXPECT_EQ(ReadJson(file)["intrinsics"][0]["value"]["ptr_wrapper"]["data"]["disto_t2"],
             (nlohmann::json{1.0, 2.0, 5.0, 3.0, 4.0}));

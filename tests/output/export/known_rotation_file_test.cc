@@ -114,6 +114,96 @@ TEST(KnownRotationFile, ReadsColmapModelsTextAndBinary) {
   }
 }
 
+// Ids that no int holds are read, and stay as names.
+TEST(KnownRotationFile, NumbersLargeIdsAnew) {
+  const TemporaryFolder folder;
+  const fs::path file = folder.Write(
+      "large.txt",
+      "rotslam_known_rotation 1\ncamera pinhole 640 480 500 500 320 240 0 0 0 0 0\nviews 2\n"
+      "18446744073709551615 1 0 0 0 1 0\n3000000000 2 0 0 0 1 0.5\ntracks 2\n"
+      "5000000000 0 0 0 2 3000000000 1 1 1 18446744073709551615 2 1 1\n"
+      "7 0 0 0 1 3000000000 9 9 1\n");
+  const KnownRotationInput read = ReadKnownRotation(file);
+  EXPECT_EQ(NameOf(read, FrameId{0}), "3000000000");
+  EXPECT_EQ(NameOf(read, FrameId{1}), "18446744073709551615");
+  EXPECT_EQ(read.timestamp_s.at(FrameId{1}), 1.0);
+  EXPECT_NEAR(read.sigma_rad.at(FrameId{0}), 0.5 * kRadFromDeg, 1e-15);
+  ASSERT_EQ(read.tracks.size(), 2u);
+  EXPECT_EQ(NameOf(read, read.tracks[0].id), "5000000000");
+  EXPECT_EQ(NameOf(read, read.tracks[1].id), "7");
+  EXPECT_EQ(read.tracks[0].observations[1].frame, FrameId{1});
+}
+
+TEST(KnownRotationFile, MergesDoublesAndSaysSo) {
+  const TemporaryFolder folder;
+  const std::string head =
+      "rotslam_known_rotation 1\ncamera pinhole 640 480 500 500 320 240 0 0 0 0 0\nviews 2\n"
+      "0 1 0 0 0 1 0\n1 2 0 0 0 1 0\ntracks 1\n4 0 0 0 3 ";
+  const KnownRotationInput same =
+      ReadKnownRotation(folder.Write("same.txt", head + "0 10 20 1 1 30 30 1 0 10.5 20 2\n"));
+  ASSERT_EQ(same.tracks[0].observations.size(), 2u);
+  EXPECT_EQ(same.tracks[0].observations[0].keypoint_px, Eigen::Vector2d(10.25, 20.0));
+  EXPECT_EQ(same.tracks[0].observations[0].sigma_px, 1.0);
+  ASSERT_EQ(same.notes.size(), 1u);
+  EXPECT_THAT(same.notes[0], HasSubstr("first track 4 in view 0: 1 merged"));
+  const KnownRotationInput apart =
+      ReadKnownRotation(folder.Write("apart.txt", head + "0 10 20 1 1 30 30 1 0 15 20 1\n"));
+  EXPECT_EQ(apart.tracks[0].observations.size(), 1u);
+  EXPECT_THAT(apart.notes[0], HasSubstr("0 merged, 1 left out"));
+}
+
+TEST(KnownRotationFile, NumbersViewsInOrder) {
+  const TemporaryFolder folder;
+  const KnownRotationInput read = ReadKnownRotation(folder.Write(
+      "gaps.txt",
+      "rotslam_known_rotation 1\ncamera pinhole 640 480 500 500 320 240 0 0 0 0 0\nviews 2\n"
+      "10 1 0 0 0 1 0.1\n30 2 0 0 0 1 0\ntracks 1\n4 0 0 0 2 10 1 1 1 30 2 2 1\n"));
+  const KnownRotationInput ordered = WithViewsInOrder(read);
+  EXPECT_EQ(NameOf(ordered, FrameId{1}), "30");
+  EXPECT_EQ(ordered.timestamp_s.at(FrameId{1}), 2.0);
+  EXPECT_EQ(ordered.sigma_rad.size(), 1u);
+  EXPECT_TRUE(ordered.sigma_rad.contains(FrameId{0}));
+  EXPECT_EQ(ordered.tracks[0].observations[1].frame, FrameId{1});
+}
+
+// Each image through its own lens, into one camera of all; what is written again is the same.
+TEST(KnownRotationFile, ReadsAndWritesModelsOfSeveralCameras) {
+  const TemporaryFolder folder;
+  const std::string cameras =
+      "1 PINHOLE 640 480 500 500 320.5 240.5\n9 SIMPLE_RADIAL 800 600 700 400.5 300.5 -0.05\n";
+  const fs::path in = folder.path() / "in";
+  fs::create_directories(in);
+  std::ofstream(in / "cameras.txt") << cameras;
+  std::ofstream(in / "images.txt") << "3 1 0 0 0 0 0 0 9 a.png\n10.5 20.5 -1 100.5 200.5 70\n"
+                                      "8 1 0 0 0 -1 0 0 1 b.png\n300.5 100.5 70\n";
+  std::ofstream(in / "points3D.txt") << "70 1 2 3 10 20 30 0.5 3 1 8 0\n";
+  const KnownRotationInput read = ReadKnownRotation(in);
+  EXPECT_THAT(read.notes, testing::ElementsAre(HasSubstr("2 cameras")));
+  EXPECT_EQ(read.camera.fx, 700.0);
+  ASSERT_EQ(read.tracks.size(), 1u);
+  EXPECT_EQ(NameOf(read, read.tracks[0].id), "70");
+  const Observation& first = read.tracks[0].observations[0];
+  EXPECT_EQ(first.sigma_px, 1.0);
+  EXPECT_NEAR(read.tracks[0].observations[1].sigma_px, 700.0 / 500.0, 1e-12);
+  EXPECT_LT((first.bearing - *read.colmap->cameras.at(9).Unproject({100.0, 200.0})).norm(), 1e-12);
+  EXPECT_LT((*read.camera.Project(first.bearing) - first.keypoint_px).norm(), 1e-9);
+  for (const ColmapForm form : {ColmapForm::kText, ColmapForm::kBinary}) {
+    const fs::path out = folder.path() / "out";
+    WriteColmapModel(out, *read.colmap, read.colmap->reconstruction, form);
+    const ColmapModel again = ReadColmapModel(out);
+    EXPECT_EQ(again.cameras, read.colmap->cameras);
+    EXPECT_EQ(again.image_name, read.colmap->image_name);
+    EXPECT_EQ(again.point_id, read.colmap->point_id);
+    EXPECT_EQ(again.keypoints, read.colmap->keypoints);
+    EXPECT_EQ(again.images.at(FrameId{3}).camera, 9);
+    EXPECT_EQ(again.images.at(FrameId{3}).keypoints_px,
+              read.colmap->images.at(FrameId{3}).keypoints_px);
+    EXPECT_EQ(again.reconstruction.point_in_world, read.colmap->reconstruction.point_in_world);
+    EXPECT_EQ(again.reconstruction.tracks[0].rgb, read.colmap->reconstruction.tracks[0].rgb);
+  }
+  EXPECT_THAT(ReadWholeFile(folder.path() / "out" / "images.bin").substr(0, 1), testing::Eq("\2"));
+}
+
 TEST(KnownRotationFile, ReadsBal) {
   const TemporaryFolder folder;
   const Scene scene = SmallScene();
@@ -170,7 +260,7 @@ TEST(KnownRotationFile, SaysWhatIsWrongWithOurs) {
            {head + views + "tracks 1\n0 0 0 0 1 7 1 1 1\n", "view 7 is not among the views"},
            {head + views + "tracks 1\n0 0 0 300 1 0 1 1 1\n", "colour is above 255"},
            {head + views + "tracks 1\n0 0 0 0 1 0 1 1 0\n", "sigma_px must be positive"},
-           {head + views + "tracks 1\n0 0 0 0 2 0 1 1 1 0 1 1 1\n", "two observations in view 0"},
+           {head + views + "tracks 2\n0 0 0 0 0\n0 0 0 0 0\n", ":8: track 0 is there twice"},
            {head + views + "tracks 1\n0 0 0 0 1 0 1 1 1\n0 0 0 0 0\n", "more lines than"}}) {
     std::ofstream(folder.path() / "broken.txt") << broken.text;
     EXPECT_THAT(Complaint(folder.path() / "broken.txt"), HasSubstr(broken.complaint))
@@ -210,8 +300,10 @@ TEST(KnownRotationFile, SaysWhatIsWrongWithColmapModels) {
   };
   EXPECT_THAT(text_with("cameras.txt", ""), HasSubstr("has no camera"));
   EXPECT_THAT(text_with("cameras.txt", "1 MAGIC 10 10 1\n"), HasSubstr("model is 'MAGIC'"));
-  EXPECT_THAT(text_with("cameras.txt", "1 PINHOLE 10 10 5 5 5 5\n2 PINHOLE 10 10 6 5 5 5\n"),
-              HasSubstr("camera 2 differs"));
+  EXPECT_THAT(text_with("cameras.txt", "1 PINHOLE 10 10 5 5 5 5\n1 PINHOLE 10 10 6 5 5 5\n"),
+              HasSubstr("camera 1 is there twice"));
+  EXPECT_THAT(text_with("cameras.txt", "2 PINHOLE 10 10 5 5 5 5\n"),
+              HasSubstr("image 1 names camera 1, which there is not"));
   EXPECT_THAT(text_with("images.txt", "1 1 0 0 0 0 0 nan 1 a.png\n\n"), HasSubstr("\"nan\""));
   EXPECT_THAT(text_with("images.txt", "1 1 0 0 0 0 0 0 1 a.png\n1 2\n"),
               HasSubstr("groups of x y"));

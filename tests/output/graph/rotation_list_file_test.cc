@@ -38,8 +38,8 @@ TEST_F(RotationListTest, PlainLinesTurnIIntoJ) {
   EXPECT_EQ(list.form, "list of rotations");
   EXPECT_THAT(list.notes,
               ElementsAre(HasSubstr("behind the rotation are not used (1 line)"),
-                          HasSubstr("taken as x_j = R x_i; there is no cycle"),
-                          HasSubstr("1 line of \"NOTE\" not used, the first in line 5")));
+                          HasSubstr("taken as x_j = R x_i; there is no cycle")));
+  EXPECT_EQ(list.unread, "1 line of \"NOTE\" (5)");
   EXPECT_THAT(list.ids, ElementsAre("7", "9", "18446744073709551615"));
   ASSERT_EQ(list.edges.size(), 2u);
   const Rotation quarter = Rotation::Exp({0.0, 0.0, M_PI / 2});
@@ -89,7 +89,7 @@ TEST_F(RotationListTest, PoseGraphComesBackWithItsIdsAndDirections) {
   edge.covariance(0, 1) = edge.covariance(1, 0) = 3e-5;
   written.edges = {edge};
   const auto file = folder_.path() / "graph.g2o";
-  WriteRotationList(file, written, cam_from_world);
+  WriteRotationList(file, written, {cam_from_world, written.center_in_world, {}});
   const RotationList read = ReadRotationList(file, kSigmaRad);
   EXPECT_TRUE(read.is_pose_graph);
   EXPECT_EQ(read.ids, written.ids);
@@ -112,7 +112,7 @@ TEST_F(RotationListTest, OtherNamesGetALinePerView) {
   const RotationMap cam_from_world = {{FrameId{0}, Rotation()},
                                       {FrameId{1}, Rotation::Exp({M_PI, 0.0, 0.0})}};
   const auto file = folder_.path() / "rotations.txt";
-  WriteRotationList(file, list, cam_from_world);
+  WriteRotationList(file, list, {cam_from_world, {}, {}});
   const std::string text = ReadWholeFile(file);
   EXPECT_THAT(text, HasSubstr("# id qx qy qz qw of cam_from_world\n5 0 0 0 1\n8 1 0 0 "));
 }
@@ -124,13 +124,17 @@ TEST_F(RotationListTest, RefusesInOneLineWithItsNumber) {
   const std::map<std::string, std::string> reasons = {
       {"# nothing\n", "has no edges"},
       {edge + "0 1 0 0 0\n", ":2: expected i j and a quaternion or the nine numbers"},
+      {edge + "0 1 0 0 0 1 0\n", ":2: expected a standard deviation in deg above zero"},
+      {edge + "0 1 0 0 0 1 -2\n", ":2: expected a standard deviation in deg above zero"},
+      {"EDGE_SE2 0 1 0 0 0 1 0 0 1 0 1\n", "is a 2-D graph (1 edges of a pose in the plane)"},
+      {"VERTEX2 0 0 0 0\nEDGE2 0 1 0 0 0 1 0 1 1 0 0\n", "is a 2-D graph"},
       {edge + "0 1 0 0 0 2\n", ":2: the quaternion is not of unit length"},
       {edge + "0 1 -1 0 0 0 1 0 0 0 1\n", ":2: the nine numbers are no rotation matrix"},
       {edge + "0 1 1 0 0 0 1 0 0 0 2\n", ":2: the nine numbers are no rotation matrix"},
       {edge + "3 3 0 0 0 1\n", ":2: an edge from a view to itself"},
       {edge + "0 1 0 0 nan 1\n", ":2: expected a finite number, found \"nan\""},
-      {edge + "0 1x 0 0 0 1\n", ":2: expected a vertex id, a whole number, found \"1x\""},
-      {edge + "0 18446744073709551616 0 0 0 1\n", ":2: expected a vertex id"},
+      {edge + "0 1.5 0 0 0 1\n", ":2: expected a view's id, a whole number or a name"},
+      {edge + "0 nan 0 0 0 1\n", ":2: expected a view's id"},
       {toro + "EDGE3 0 1 0 0\n", ":2: the line ends too early"},
       {toro + "VERTEX3 0 0 0 0 0 0 1e400\n", ":2: expected a finite number"},
       {toro + "VERTEX3 0 0 0 0 1e200 1e200 1e200\n", ":2: an angle is out of range"},
@@ -248,7 +252,7 @@ TEST_F(RotationListTest, GlomapsNamesAreIds) {
   const auto file = folder_.path() / "named.g2o";
   RotationMap cam_from_world;
   for (int k = 0; k < 10; ++k) cam_from_world[FrameId{k}] = Rotation();
-  WriteRotationList(file, list, cam_from_world);
+  WriteRotationList(file, list, {cam_from_world, {}, {}});
   EXPECT_THAT(ReadWholeFile(file), HasSubstr("# 0 is frame_100.jpg\n"));
 }
 
@@ -257,11 +261,69 @@ TEST_F(RotationListTest, DecimalCommasAndOtherTags) {
       "VERTEX_SE2 0 0,5 0 0\nEDGE_SE3:QUAT 0 1 0,0 0,0 0,0 0,0 0,0 0,6 0,8"
       " 1 0 0 0 0 0 1 0 0 0 0 1 0 0 0 4,0 0 0 4 0 4\n");
   EXPECT_NEAR(list.edges[0].j_from_i.Angle(), 2.0 * std::atan2(0.6, 0.8), 1e-12);
-  EXPECT_THAT(list.notes,
-              ElementsAre(HasSubstr("commas are taken for decimal points"),
-                          HasSubstr("1 line of \"VERTEX_SE2\" not used, the first in line 1")));
-  EXPECT_THAT(RuntimeErrorOf([&] { Read("EDGE_SE2 0 1 0 0 0 1 0 0 1 0 1\n"); }),
-              HasSubstr("found 1 line of \"EDGE_SE2\""));
+  EXPECT_THAT(list.notes, ElementsAre(HasSubstr("commas are taken for decimal points")));
+  EXPECT_EQ(list.unread, "1 line of \"VERTEX_SE2\" (1)");
+  EXPECT_THAT(RuntimeErrorOf([&] { Read("EDGE_POINT 0 1 0 0 0 1 0 0 1 0 1\n"); }),
+              HasSubstr("found 1 line of \"EDGE_POINT\" (1)"));
+}
+
+TEST_F(RotationListTest, NamesAndWholeNumbersOfAnySizeAreIds) {
+  const RotationList list = Read(
+      "+007 -18446744073709551617 0 0 0 1\n-0 left.png 0 0 0 1\nleft.png 7 0 0 0 1 2.5\n"
+      "left 1 2 3\nEDGE_SE3:QUAT 0 7 0 0 0 0 0 0 1\n");
+  EXPECT_THAT(list.ids, ElementsAre("-18446744073709551617", "0", "7", "left.png"));
+  ASSERT_EQ(list.edges.size(), 3u);
+  EXPECT_EQ(list.edges[0].i, FrameId{2});
+  EXPECT_EQ(list.edges[0].j, FrameId{0});
+  EXPECT_EQ(list.edges[2].i, FrameId{3});
+  EXPECT_EQ(list.unread, "1 line of \"EDGE_SE3:QUAT\" (5), 1 line of \"left\" (4)");
+  const RotationList graph = Read(
+      "EDGE_SE3:QUAT cam_b cam_a 0 0 0 0 0 0 1"
+      " 1 0 0 0 0 0 1 0 0 0 0 1 0 0 0 4 0 0 4 0 4\nEDGE_SE3_PRIOR 0 0 0 0 0 0 0 0 1\n"
+      "EDGE_SE2 1 2 0 0 0\nEDGE_SE2 2 3 0 0 0\nEDGE_SE2 2 3 0 0 0\nEDGE_SE2 2 3 0 0 0\n");
+  EXPECT_THAT(graph.ids, ElementsAre("cam_a", "cam_b"));
+  EXPECT_EQ(graph.unread,
+            "4 lines of \"EDGE_SE2\" (3, 4, 5 ...), 1 line of \"EDGE_SE3_PRIOR\" (2)");
+}
+
+TEST_F(RotationListTest, EulerAnglesAreThoseOfToro) {
+  const std::string numbers = " 1 2 3 0.1 0.2 0.3 9 0 0 0 0 0 9 0 0 0 0 9 0 0 0 4 0 0 16 0 25\n";
+  const RotationList toro = Read("EDGE3 0 1" + numbers);
+  const RotationList euler =
+      Read("VERTEX_SE3:EULER 0 1 2 3 0.1 0.2 0.3\nEDGE_SE3:EULER 0 1" + numbers);
+  EXPECT_EQ(euler.form, "g2o");
+  EXPECT_EQ(euler.unread, "");
+  EXPECT_LT(Angle(euler.cam_from_world.at(FrameId{0}), toro.edges[0].j_from_i), 1e-12);
+  EXPECT_LT(Angle(euler.edges[0].j_from_i, toro.edges[0].j_from_i), 1e-12);
+  EXPECT_EQ(euler.edges[0].covariance, toro.edges[0].covariance);
+  ASSERT_EQ(euler.translations.size(), 1u);
+  EXPECT_EQ(euler.translations[0].j_in_i, Eigen::Vector3d(1, 2, 3));
+  EXPECT_EQ(euler.translations[0].information(0, 0), 9.0);
+  EXPECT_EQ(euler.translations[0].information(5, 5), 100.0);  // g2o's is of half the angle
+}
+
+TEST_F(RotationListTest, AnEdgeMayHaveADeviationOfItsOwn) {
+  const RotationList list = Read("0 1 0 0 0 1 2.5\n1 2 0 0 0 1\n");
+  const double sigma_rad = 2.5 * kRadFromDeg;
+  EXPECT_NEAR(list.edges[0].covariance(1, 1), sigma_rad * sigma_rad, 1e-12);
+  EXPECT_NEAR(list.edges[1].covariance(1, 1), kSigmaRad * kSigmaRad, 1e-12);
+  EXPECT_THAT(list.notes, testing::Contains(HasSubstr("standard deviation in deg (1 line)")));
+}
+
+TEST_F(RotationListTest, StartsComeFromListsAndPoseGraphs) {
+  const RotationList list = Read("a 2 0 0 0 1\n");
+  const auto lines =
+      folder_.Write("start.txt", "# id q\n2 0 0 0 1 0.1 0.1 0.1\na 1 0 0 0\n5 0 0 0 1\n");
+  const RotationMap start = ReadStartOrientations(lines, list);
+  ASSERT_EQ(start.size(), 2u);
+  EXPECT_NEAR(start.at(FrameId{1}).AngleDeg(), 180.0, 1e-9);
+  const auto graph = folder_.Write(
+      "start.g2o", "VERTEX_SE3:QUAT 2 0 0 0 0 0 0 1\nVERTEX_SE3:EULER a 0 0 0 0.5 0 0\n");
+  EXPECT_LT(Angle(ReadStartOrientations(graph, list).at(FrameId{1}), Rotation::Exp({-0.5, 0, 0})),
+            1e-12);
+  const auto other = folder_.Write("other.txt", "2 0 0 0 1\n");
+  EXPECT_THAT(RuntimeErrorOf([&] { ReadStartOrientations(other, list); }),
+              HasSubstr("has no orientation of view a"));
 }
 
 }  // namespace

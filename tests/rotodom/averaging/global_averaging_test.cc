@@ -386,6 +386,35 @@ TEST(CertifyAveraging, RefusesALocalMinimum) {
   EXPECT_GT(global.smallest_eigenvalue, -1e-8);
 }
 
+TEST(CertifyAveraging, TellsWhatItCosts) {
+  const WrongEdges scene = MakeWrongEdges({.num_views = 200, .noise_deg = 2.0});
+  std::vector<CertificateProgress> told;
+  CertifyAveraging(scene.edges,
+                   Ones(scene.edges),
+                   Average(scene.edges).cam_from_world,
+                   [&](const CertificateProgress& progress) { told.push_back(progress); });
+  ASSERT_GE(told.size(), 2u);
+  ASSERT_LE(told.back().factorisations, kMaxCertificateFactorisations);
+  for (std::size_t k = 0; k < told.size(); ++k) {
+    EXPECT_EQ(told[k].factorisations, static_cast<int>(k));
+    // At least the matrix' own entries, at most those of a full one.
+    EXPECT_GE(told[k].entries, 9.0 * static_cast<double>(scene.edges.size()) / 2.0);
+    EXPECT_LE(told[k].entries, 600.0 * 600.0 / 2.0);
+  }
+}
+
+TEST(AverageGlobally, EdgesCanBeReportedAnew) {
+  const WrongEdges scene = MakeWrongEdges({.num_views = 50, .wrong_ratio = 0.1});
+  const GlobalAveragingResult result = Average(scene.edges);
+  GlobalAveragingResult again = result;
+  ReportEdges(scene.edges, {}, again);
+  EXPECT_NEAR(again.cost, result.cost, 1e-9 * result.cost);
+  EXPECT_EQ(again.num_inliers, result.num_inliers);
+  for (std::size_t k = 0; k < result.sigmas.size(); ++k) {
+    EXPECT_NEAR(again.sigmas[k], result.sigmas[k], 1e-6 * (1.0 + result.sigmas[k]));
+  }
+}
+
 TEST(CertifyAveraging, RefusesWhatBreaksItsContract) {
   const WrongEdges scene = MakeWrongEdges({.num_views = 20});
   std::vector<double> weights = Ones(scene.edges);

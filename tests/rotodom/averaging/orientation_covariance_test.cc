@@ -10,6 +10,7 @@
 #include <Eigen/Dense>
 #include <gtest/gtest.h>
 
+#include "rotodom/averaging/closure.h"
 #include "tests/scenes/rotation_graph.h"
 #include "tests/scenes/tracked_edges.h"
 
@@ -350,6 +351,32 @@ TEST(OrientationCovariance, LastingErrorsAddUp) {
   // The errors of steps, correlated by about exp(-1/4) from each to the next, are summed.
   EXPECT_GT(lasting, 4.0 * alone);
   EXPECT_LT(lasting, 9.0 * alone);
+}
+
+TEST(OrientationCovariance, TrianglesTellWhereEdgesAreWorseThanTheySay) {
+  constexpr double kFactor = 9.0;  // of the edges' variances
+  double plain = 0.0;
+  double by_closures = 0.0;
+  for (std::uint64_t seed = 1; seed <= kNumSeeds; ++seed) {
+    TrackedEdges scene = IndependentEdges({.num_views = 60, .noise_deg = 0.1, .seed = seed});
+    ViewGraph graph;
+    for (std::vector<TrackedEdge>& edges : scene.edges) {
+      for (TrackedEdge& tracked : edges) {
+        tracked.edge.covariance /= kFactor;
+        graph.AddEdge(tracked.edge);
+      }
+    }
+    const double variance = ClosureVariance(graph);
+    EXPECT_NEAR(variance, kFactor, 0.3 * kFactor);
+    const Processed run = Process(scene, WithoutModelError());
+    const double error =
+        NormalisedError(run.newest, run.newest_covariance, scene.true_cam_from_world);
+    plain += error / kNumSeeds;
+    by_closures += error / variance / kNumSeeds;
+  }
+  EXPECT_GT(plain, 4.0);
+  EXPECT_GT(by_closures, 0.5);
+  EXPECT_LT(by_closures, 2.0);
 }
 
 TEST(OrientationCovariance, GrowsWithTheDrift) {

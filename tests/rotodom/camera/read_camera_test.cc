@@ -60,6 +60,30 @@ Camera Make(CameraModel model,
   return camera;
 }
 
+TEST_F(ReadCameraTest, OursHasMaskedPolygons) {
+  const std::string global =
+      "model: pinhole\nwidth: 640\nheight: 480\nfx: 500\nfy: 500\ncx: 320\ncy: 240\n";
+  const auto masked = [&](const std::string& value) {
+    const CameraFile file = ReadCameraFile(Write("some.txt", global + "masked_px: " + value));
+    return file.cameras.front().masked_px;
+  };
+  const auto two =
+      masked("[[[0, 400], [640, 400.5], [640, 480]], [[1, 2], [3, 4], [5, 6], [7, 8]]]");
+  ASSERT_EQ(two.size(), 2U);
+  EXPECT_EQ(two[0].size(), 3U);
+  EXPECT_EQ(two[0][1], Eigen::Vector2d(640.0, 400.5));
+  EXPECT_EQ(two[1].size(), 4U);
+  const auto one = masked("[[0, 400], [640, 400], [640, 480]]");
+  ASSERT_EQ(one.size(), 1U);
+  EXPECT_EQ(one[0][2], Eigen::Vector2d(640.0, 480.0));
+  for (const char* wrong :
+       {"3", "[]", "[[1, 2], [3, 4]]", "[[[1, 2], [3, 4], [5]]]", "[1, 2, 3]"}) {
+    EXPECT_THAT(Complaint(global + "masked_px: " + wrong + "\n"),
+                HasSubstr("some.txt:8: masked_px must be polygons"))
+        << wrong;
+  }
+}
+
 TEST_F(ReadCameraTest, OursGivesBackWhatWasWritten) {
   const double third = 1.0 / 3.0;
   for (const Camera& camera :
@@ -74,6 +98,32 @@ TEST_F(ReadCameraTest, OursGivesBackWhatWasWritten) {
     EXPECT_EQ(ReadCamera(folder_), camera);  // the folder stands for it
     EXPECT_FALSE(fs::exists(folder_ / "camera.yaml.tmp"));
   }
+}
+
+TEST_F(ReadCameraTest, OursSaysHowWellTheLensIsKnown) {
+  LensSigmas sigmas = {0.5, 1.0 / 3.0, 1e-7, {0.01, 0.0, 1e-5, 2e-5, 0.1}};
+  const Camera radtan = Make(CameraModel::kRadtan, {640, 480}, {5e2, 5e2, 0, 1}, {0.1, 0.2});
+  const Camera pinhole = Make(CameraModel::kPinhole, {640, 480}, {5e2, 5e2, 0, 1});
+  const auto read = [&] { return ReadCameraFile(folder_ / "camera.yaml").cameras.at(0); };
+  for (const Camera& camera : {radtan, pinhole}) {
+    WriteCameraYaml(folder_ / "camera.yaml", camera, sigmas);
+    EXPECT_EQ(read().camera, camera);
+    EXPECT_EQ(read().sigmas, sigmas) << CameraYaml(camera, sigmas);
+  }
+  const Camera fisheye = Make(CameraModel::kEquidistant, {64, 48}, {190, 191, 32, 24}, {0.1});
+  WriteCameraYaml(folder_ / "camera.yaml", fisheye, sigmas);
+  sigmas.distortion[4] = 0.0;
+  EXPECT_EQ(read().sigmas, sigmas);
+  WriteCameraYaml(folder_ / "camera.yaml", radtan);
+  EXPECT_FALSE(read().sigmas);
+
+  const std::string known =
+      "model: fov\nfx: 5\nfy: 5\ncx: 3\ncy: 2\ndistortion: [0.9]\nsigma_focal_px: 1\n";
+  EXPECT_THAT(Complaint(known), HasSubstr("sigma_cx_px is missing"));
+  const std::string negative = known + "sigma_cx_px: 1\nsigma_cy_px: -1\nsigma_distortion: [0]\n";
+  EXPECT_THAT(Complaint(negative), HasSubstr("sigma_cy_px is '-1', must not be negative"));
+  const std::string two = known + "sigma_cx_px: 1\nsigma_cy_px: 1\nsigma_distortion: [0, 1]\n";
+  EXPECT_THAT(Complaint(two), HasSubstr("sigma_distortion has 2 values, fov takes 1"));
 }
 
 TEST_F(ReadCameraTest, OursKnowsTheReadoutOfARollingShutter) {

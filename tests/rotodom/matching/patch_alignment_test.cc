@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <iterator>
 #include <numbers>
 #include <string>
 #include <vector>
@@ -9,6 +10,7 @@
 #include <Eigen/Dense>
 #include <gtest/gtest.h>
 
+#include "rotodom/simd/simd_level.h"
 #include "tests/scenes/scene.h"
 
 namespace rotslam {
@@ -245,6 +247,79 @@ TEST(AlignPatch, KnowsItsOwnError) {
     Record("noise_" + std::to_string(static_cast<int>(noise)), outcome);
     EXPECT_GT(outcome.mahalanobis, 0.5) << noise << " grey levels";
     EXPECT_LT(outcome.mahalanobis, noise < 10.0 ? 1.6 : 2.6) << noise << " grey levels";
+  }
+}
+
+TEST(AlignPatch, EveryLevelOfInstructionsGivesTheSame) {
+  const cv::Mat from = Draw({});
+  const auto results = [&](SimdLevel level) {
+    LimitSimdLevel(level);
+    std::vector<double> all;
+    for (const double angle_deg : {0.0, 20.0}) {
+      Appearance appearance;
+      appearance.turn = Turn(angle_deg);
+      appearance.shift_px = {0.3, -0.6};
+      appearance.noise = 2.0;
+      const cv::Mat in = Draw(appearance);
+      for (const Eigen::Vector2d& px : Places()) {
+        const auto patch = PatchTemplate::Sample(from, px, appearance.turn);
+        if (!patch) continue;
+        const Eigen::Vector2d start_px = appearance.Move(px) + Eigen::Vector2d(0.7, 0.4);
+        const auto found = AlignPatch(*patch, in, start_px, kReachPx);
+        if (!found) continue;
+        const auto corrected = CorrectForParallax(*patch, in, *found, {{5.0, 2.0}, 0.05});
+        for (const PatchAlignment& one : {*found, corrected.value_or(*found)}) {
+          all.insert(all.end(), {one.center_px.x(), one.center_px.y(), one.correlation});
+          all.insert(all.end(), one.covariance.data(), one.covariance.data() + 4);
+        }
+      }
+    }
+    return all;
+  };
+  const std::vector<double> baseline = results(SimdLevel::kBaseline);
+  EXPECT_GT(baseline.size(), 14u * Places().size());
+  EXPECT_EQ(results(SimdLevel::kAvx2), baseline);
+  EXPECT_EQ(results(SimdLevel::kAvx512), baseline);
+}
+
+TEST(PatchLoops, MemoryBeyondTheLoadedRowsDoesNotCount) {
+  std::vector<const PatchLoops*> levels = {&kPatchLoopsBaseline};
+#if defined(__x86_64__)
+  LimitSimdLevel(SimdLevel::kAvx512);
+  if (UsedSimdLevel() >= SimdLevel::kAvx2) levels.push_back(&kPatchLoopsAvx2);
+  if (UsedSimdLevel() >= SimdLevel::kAvx512) levels.push_back(&kPatchLoopsAvx512);
+#endif
+  const cv::Mat image = Draw({});
+  const PixelWeights weights{0.1F, 0.2F, 0.3F, 0.4F};
+  std::vector<float> of_baseline;
+  for (const PatchLoops* loops : levels) {
+    PatchWindow window;
+    PatchWindow sampled = {};
+    std::fill(std::begin(window.values), std::end(window.values), NAN);
+    loops->load(image.ptr<std::uint8_t>(50) + 60, image.step, kSampledSide + 1, &window);
+    loops->shift(&window, &weights, &sampled);
+    PatchPlanes planes;
+    PatchMoments moments;
+    loops->prepare(&sampled, &planes, &moments);
+    std::fill(std::begin(window.values), std::end(window.values), NAN);
+    loops->load(image.ptr<std::uint8_t>(51) + 61, image.step, kPatchSide + 1, &window);
+    PatchSums sums;
+    loops->compare(&planes, &window, &weights, &sums);
+    DeformationSums deformation;
+    const DeformationInputs inputs{0.1F, 0.2F, 0.3F, 0.4F, 0.6F, 0.8F};
+    loops->deform(&planes, &window, &weights, &inputs, &deformation);
+    const std::vector<float> all = {moments.energy,
+                                    moments.xy,
+                                    sums.gradient_x,
+                                    sums.gradient_y,
+                                    sums.values,
+                                    sums.sum,
+                                    sums.squares,
+                                    deformation.products[14],
+                                    deformation.image_squares};
+    for (const float value : all) EXPECT_TRUE(std::isfinite(value));
+    if (of_baseline.empty()) of_baseline = all;
+    EXPECT_EQ(all, of_baseline);
   }
 }
 

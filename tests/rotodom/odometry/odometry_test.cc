@@ -267,7 +267,7 @@ TEST(RotationalOdometry, RejectsABrokenContract) {
   EXPECT_THROW(odometry.AddFrame(FrameId{3}, 2.0, cv::Mat()), std::invalid_argument);
   EXPECT_NO_THROW(odometry.AddFrame(FrameId{5}, 2.0, cv::Mat()));
   EXPECT_THROW(odometry.AddFrame(FrameId{6}, 2.0, cv::Mat()), std::invalid_argument);
-  EXPECT_THROW(odometry.AddFrame(FrameId{6}, 3.0, cv::Mat::zeros(10, 20, CV_8U)),
+  EXPECT_THROW(odometry.AddFrame(FrameId{6}, 3.0, cv::Mat(10, 20, CV_8U, cv::Scalar(0))),
                std::invalid_argument);
 }
 

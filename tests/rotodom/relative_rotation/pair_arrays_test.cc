@@ -3,10 +3,12 @@
 #include <cmath>
 #include <limits>
 #include <random>
+#include <utility>
 #include <vector>
 
 #include <gtest/gtest.h>
 
+#include "rotodom/simd/simd_level.h"
 #include "tests/rotodom/relative_rotation/pair_scene.h"
 
 namespace rotslam {
@@ -158,11 +160,75 @@ TEST(PairArrays, ScoreEqualsTheSlowDefinitionAndGivesUpAtTheLimit) {
       score += std::log1p(counted / (finest * finest));
     }
     const double infinity = std::numeric_limits<double>::infinity();
-    const HypothesisScore whole = ScoreEpipolar(pairs, model, threshold, finest, infinity);
+    const HypothesisScore whole = ScoreEpipolar(pairs, model, {threshold, finest}, infinity);
     EXPECT_NEAR(whole.score, score, 1e-9 * score);
     EXPECT_EQ(whole.num_inliers, num_inliers);
-    EXPECT_GE(ScoreEpipolar(pairs, model, threshold, finest, 0.3 * score).score, 0.3 * score);
+    EXPECT_GE(ScoreEpipolar(pairs, model, {threshold, finest}, 0.3 * score).score, 0.3 * score);
   }
+}
+
+// All that the loops compute of some pairs.
+std::vector<double> AllResults(const PairArrays& pairs, const EpipolarModel& model) {
+  const double loss = 0.5 / kPairFocalPx;
+  const ScoreBounds bounds{1.5 / kPairFocalPx, 0.1 / kPairFocalPx};
+  const EpipolarNormal normal = LinearizeEpipolar(pairs, model, loss);
+  const RotationNormal rotation = LinearizeRotation(pairs, model.j_from_i, loss);
+  const std::vector<double> distances = SquaredDistances(pairs, model);
+  const std::vector<double> flows = SquaredFlows(pairs, model.j_from_i);
+  const HypothesisScore lines =
+      ScoreEpipolar(pairs, model, bounds, std::numeric_limits<double>::infinity());
+  const HypothesisScore half_lines = ScoreHalfLines(pairs, model, distances, bounds, loss);
+  std::vector<double> all = {normal.cost,
+                             lines.score,
+                             double(lines.num_inliers),
+                             half_lines.score,
+                             double(half_lines.num_inliers),
+                             double(CountBelow(distances, loss * loss))};
+  all.insert(all.end(), normal.H.data(), normal.H.data() + normal.H.size());
+  all.insert(all.end(), normal.gradient.data(), normal.gradient.data() + 5);
+  all.insert(all.end(), rotation.H.data(), rotation.H.data() + rotation.H.size());
+  all.insert(all.end(), rotation.gradient.data(), rotation.gradient.data() + 3);
+  all.insert(all.end(), distances.begin(), distances.end());
+  all.insert(all.end(), flows.begin(), flows.end());
+  return all;
+}
+
+TEST(PairArrays, EveryLevelOfInstructionsGivesTheSame) {
+  for (const double noise_ratio : {1.0, 3.0}) {
+    const PairScene scene = Scene(noise_ratio);
+    const PairArrays pairs(scene.pairs);
+    std::vector<std::vector<double>> results;
+    for (const SimdLevel level : {SimdLevel::kBaseline, SimdLevel::kAvx2, SimdLevel::kAvx512}) {
+      LimitSimdLevel(level);
+      results.push_back(AllResults(pairs, NearTruth(scene)));
+    }
+    EXPECT_EQ(results[1], results[0]) << "AVX2, noise ratio " << noise_ratio;
+    EXPECT_EQ(results[2], results[0]) << "AVX-512, noise ratio " << noise_ratio;
+  }
+}
+
+TEST(PairArrays, HalfLinesEndAtInfinity) {
+  // Points before both cameras, then the same with some of them behind.
+  const PairScene scene = MakePairScene({.num_pairs = 101, .seed = 5});
+  const EpipolarModel model{scene.j_from_i, scene.translation_direction};
+  const ScoreBounds bounds{1.5 / kPairFocalPx, 0.1 / kPairFocalPx};
+  const double infinity = std::numeric_limits<double>::infinity();
+  std::vector<BearingPair> pairs = scene.pairs;
+  const auto scores = [&] {
+    const PairArrays arrays(pairs);
+    return std::pair(ScoreEpipolar(arrays, model, bounds, infinity),
+                     ScoreHalfLines(arrays, model, SquaredDistances(arrays, model), bounds, 0.0));
+  };
+  const auto [lines, half_lines] = scores();
+  EXPECT_NEAR(half_lines.score, lines.score, 0.02 * lines.score);
+  // Moved to the other side of the point at infinity, along the line.
+  for (std::size_t k = 0; k < 20; ++k) {
+    const Eigen::Vector3d g = model.j_from_i * pairs[k].bearing_i;
+    pairs[k].bearing_j = (2.0 * g - pairs[k].bearing_j).normalized();
+  }
+  const auto [moved_lines, moved_half_lines] = scores();
+  EXPECT_GT(moved_half_lines.score, moved_lines.score + 20.0);
+  EXPECT_LT(moved_half_lines.num_inliers, moved_lines.num_inliers - 15);
 }
 
 TEST(PairArrays, ThinnedTakesPairsInOrder) {
@@ -222,7 +288,8 @@ TEST(DifferenceCovariance, IsTheOneOfNoisyPositionsInBothImages) {
         basis.transpose() * (j_from_i * noisy(f_i, C_i) - noisy(f_j, C_j)) / kSigma;
     sum += difference * difference.transpose();
   }
-  const Eigen::Matrix2d expected = DifferenceCovariance(f_i, C_i, f_j, C_j, j_from_i.Matrix());
+  const Eigen::Matrix2d expected =
+      DifferenceCovariance(f_i, C_i, f_j, C_j, j_from_i.Matrix(), TangentBasis(f_j));
   EXPECT_LT((sum / kDraws - expected).norm(), 0.05 * expected.norm());
 }
 

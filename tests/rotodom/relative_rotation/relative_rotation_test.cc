@@ -341,6 +341,38 @@ TEST(EstimateRelativeRotation, RepeatedMatchesDoNoHarm) {
   EXPECT_LT(ErrorDeg(estimate->j_from_i, scene.j_from_i), 0.2);
 }
 
+TEST(UpdateRelativeRotation, FollowsBearingsThatChangedALittle) {
+  for (const double baseline_over_depth : {0.0, 0.02, 0.2}) {
+    PairScene scene = MakePairScene(
+        {.baseline_over_depth = baseline_over_depth, .outlier_ratio = 0.3, .seed = 3});
+    const auto known = EstimateRelativeRotation({scene.pairs}, Rotation(), kPairFocalPx, {}, 1);
+    ASSERT_TRUE(known);
+    // A turn by half a pixel, and a shear like that of a rolling shutter.
+    const Rotation turn = Rotation::Exp({0.0, 0.5 / kPairFocalPx, 0.0});
+    for (BearingPair& pair : scene.pairs) {
+      const Eigen::Vector3d turned = turn * pair.bearing_j;
+      const Eigen::Vector3d shear(0.5 / kPairFocalPx * turned.y(), 0.0, 0.0);
+      pair.bearing_j = (turned + shear).normalized();
+    }
+    const auto fresh = EstimateRelativeRotation({scene.pairs}, Rotation(), kPairFocalPx, {}, 1);
+    const auto updated = UpdateRelativeRotation({scene.pairs},
+                                                {known->j_from_i, known->translation_direction},
+                                                Rotation(),
+                                                kPairFocalPx,
+                                                {});
+    ASSERT_TRUE(fresh && updated);
+    // Well below the standard deviation.
+    const double sigma_deg = std::sqrt(fresh->covariance.trace() / 3.0) / kRadFromDeg;
+    EXPECT_LT(ErrorDeg(updated->j_from_i, fresh->j_from_i), 0.1 * sigma_deg)
+        << "baseline " << baseline_over_depth;
+    EXPECT_EQ(updated->rotation_only, fresh->rotation_only);
+    EXPECT_NEAR(double(updated->inliers.size()), double(fresh->inliers.size()), 2.0);
+  }
+  const PairScene few = MakePairScene({.num_pairs = 5});
+  EXPECT_FALSE(UpdateRelativeRotation(
+      {few.pairs}, {few.j_from_i, few.translation_direction}, few.j_from_i, kPairFocalPx, {}));
+}
+
 TEST(EstimateRelativeRotation, RejectsABrokenContract) {
   PairScene scene = MakePairScene({});
   RelativeRotationOptions bad;

@@ -40,6 +40,22 @@ TEST(EstimateReadout, KnowsAGlobalShutter) {
   }
 }
 
+// Of pan720, frames 30 to 79, whose shutter is global, with a lens of k1 = -0.05 left in.
+TEST(ReadoutEstimate, ASmallShearMayBeALensThatWasLeftIn) {
+  ReadoutEstimate estimate;
+  estimate.readout_s = 0.00297;
+  estimate.sigma_s = 0.00046;
+  estimate.gain_sigmas = 4.25;
+  estimate.least_gain_sigmas = 2.04;
+  estimate.shear_px = 0.258;
+  estimate.noise_px = 0.05;
+  estimate.frame_s = 1.0 / 30.0;
+  EXPECT_FALSE(estimate.IsRolling());
+  // As much of a walk's readout of 20 ms as it takes.
+  estimate.shear_px = 0.5;
+  EXPECT_TRUE(estimate.IsRolling());
+}
+
 TEST(EstimateReadout, ASteadyTurnDoesNotTell) {
   const TurnAt steady = [](double time_s) { return Rotation::Exp({0.0, 0.5 * time_s - 0.5, 0.0}); };
   const auto readout = FilmRolling(steady, Stay, 0.02, ReadoutStart::kTop, 60).Estimate();

@@ -132,11 +132,11 @@ TEST(CorrectRollingShutter, LeavesOutWhatIsSeenAtNearlyTheSameTime) {
   const auto bearing_with = [&](const View& other) {
     View view = view_at(0.0, {150.0, 40.0});
     const View* others[] = {&other};
-    CorrectRollingShutter(camera, motion, others, view);
+    CorrectRollingShutter(camera, motion, others, 1, view);
     return view.features.bearings[0];
   };
   View alone = view_at(0.0, {150.0, 40.0});
-  CorrectRollingShutter(camera, motion, {}, alone);
+  CorrectRollingShutter(camera, motion, {}, 1, alone);
   // The same pixel a thousandth of a second later, a match that is off by a pixel.
   EXPECT_EQ(bearing_with(view_at(0.001, {151.0, 40.0})), alone.features.bearings[0]);
   EXPECT_NE(bearing_with(view_at(0.033, {151.0, 40.0})), alone.features.bearings[0]);

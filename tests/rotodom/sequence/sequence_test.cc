@@ -377,10 +377,11 @@ TEST_F(SequenceTest, BringsEveryPixelFormatToEightBits) {
   WriteImage("3.png", cv::Scalar(257.0 * 10), CV_16UC1);
   WriteImage("4.png", cv::Scalar(257.0 * 10, 257.0 * 20, 257.0 * 30, 65535.0), CV_16UC4);
   WriteImage("5.tiff", cv::Scalar(0.5), CV_32FC1);
+  WriteImage("6.png", cv::Scalar(65534.0), CV_16UC1);
   const auto sequence = OpenSequence(folder_, {});
   EXPECT_EQ(sequence->image_size(), cv::Size(16, 12));
   const std::vector<Frame> frames = ReadAll(*sequence);
-  ASSERT_EQ(frames.size(), 6u);
+  ASSERT_EQ(frames.size(), 7u);
   for (const int k : {0, 1, 2, 4}) {
     ASSERT_EQ(frames[k].image.type(), CV_8UC3) << k << ": " << frames[k].problem;
     EXPECT_EQ(frames[k].image.at<cv::Vec3b>(3, 4), cv::Vec3b(10, 20, 30)) << k;
@@ -412,6 +413,32 @@ TEST_F(SequenceTest, FindsTheBitsOfPixelsOnceForTheSequence) {
               std::min(255L, std::lround(test.largest / test.divisor)));
     EXPECT_EQ(frames[1].image.at<cv::Vec3b>(3, 4)[2], std::lround(208 / test.divisor));
   }
+}
+
+// A thermal camera's counts: a few hundred of 16,384, in some frames less of them. The rectified
+// image has a border of zeros, and a dead pixel is at the upper end.
+TEST_F(SequenceTest, StretchesNarrowPixelsOnceForTheSequence) {
+  cv::Mat ramp(40, 50, CV_16UC1);
+  for (int k = 0; k < 2000; ++k) {
+    ramp.at<std::uint16_t>(k / 50, k % 50) = static_cast<std::uint16_t>(7000 + k / 2);
+  }
+  ramp.row(0).setTo(0);
+  ramp.at<std::uint16_t>(1, 1) = 16000;
+  for (const char* name : {"0.png", "2.png"}) cv::imwrite((folder_ / name).string(), ramp);
+  cv::imwrite((folder_ / "1.png").string(), cv::Mat(cv::min(ramp, 7500.0)));
+  const auto sequence = OpenSequence(folder_, {});
+  EXPECT_THAT(
+      sequence->notes(),
+      testing::Contains(testing::ContainsRegex(
+          "pixels are 16 bit but use only 70[0-9][0-9] to 799[0-9]: these become 0 to 255")));
+  const std::vector<Frame> frames = ReadAll(*sequence);
+  ASSERT_EQ(frames.size(), 3u);
+  for (const Frame& frame : frames) {
+    EXPECT_EQ(frame.image.at<unsigned char>(0, 3), 0);
+    EXPECT_NEAR(frame.image.at<unsigned char>(10, 0), 255 * 230 / 975, 2);
+  }
+  EXPECT_NEAR(frames[0].image.at<unsigned char>(39, 49), 255, 1);
+  EXPECT_NEAR(frames[1].image.at<unsigned char>(39, 49), 255 * 480 / 975, 2);
 }
 
 TEST_F(SequenceTest, ScalesFloatingPointImagesAlike) {
@@ -541,13 +568,22 @@ TEST_F(SequenceTest, RefusesFilesThatAreNoVideo) {
   EXPECT_THAT(Complaint(WriteText("film.mp4", "no film")), HasSubstr("not a video"));
 }
 
-TEST(MatchToImages, FillsInOrRefuses) {
+TEST(MatchToImages, FillsInScalesOrRefuses) {
   Camera camera;
   camera.fx = camera.fy = 500.0;
   EXPECT_EQ(MatchToImages(camera, {752, 480}).width, 752);
   camera.width = 640;
   camera.height = 480;
   EXPECT_EQ(MatchToImages(camera, {640, 480}), camera);
+  camera.cx = 319.5;
+  camera.cy = 99.5;
+  const Camera half = MatchToImages(camera, {320, 240});
+  EXPECT_DOUBLE_EQ(half.fy, 250.0);
+  EXPECT_DOUBLE_EQ(half.cx, 159.5);
+  EXPECT_DOUBLE_EQ(half.cy, 49.5);
+  EXPECT_EQ(half.height, 240);
+  EXPECT_EQ(MatchToImages(half, {640, 480}), camera);
+  EXPECT_THROW(MatchToImages(camera, {641, 480}), std::runtime_error);
   try {
     MatchToImages(camera, {752, 480});
     FAIL() << "no exception";

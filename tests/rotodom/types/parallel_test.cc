@@ -1,6 +1,8 @@
 #include "rotodom/types/parallel.h"
 
 #include <stdexcept>
+#include <string>
+#include <thread>
 #include <vector>
 
 #include <gtest/gtest.h>
@@ -26,6 +28,21 @@ TEST(ParallelFor, PassesOnTheFirstException) {
   } catch (const std::runtime_error& error) {
     EXPECT_STREQ(error.what(), "7");
   }
+}
+
+TEST(ParallelFor, MayBeCalledInsideAndFromManyThreads) {
+  std::vector<std::vector<int>> visits(20, std::vector<int>(30, 0));
+  const auto visit_all = [&](int first) {
+    for (int repetition = 0; repetition < 50; ++repetition) {
+      ParallelFor(10, 3, [&](int outer) {
+        ParallelFor(30, 2, [&](int inner) { ++visits[first + outer][inner]; });
+      });
+    }
+  };
+  std::thread other([&] { visit_all(10); });
+  visit_all(0);
+  other.join();
+  for (const std::vector<int>& of_one : visits) EXPECT_EQ(of_one, std::vector<int>(30, 50));
 }
 
 TEST(ParallelFor, DoesNothingForNoWork) {

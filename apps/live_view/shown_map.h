@@ -1,0 +1,65 @@
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <unordered_map>
+#include <vector>
+
+#include <Eigen/Core>
+#include <nlohmann/json.hpp>
+
+#include "apps/slam/live/live_map.h"
+
+namespace rotslam {
+
+/// The map that a page shows, in rows that know when they changed last, so that a browser gets what
+/// is new to it alone. Versions count the maps that have been shown, from 1.
+class ShownMap {
+ public:
+  /// Of larger maps only points whose track is a multiple of two, four, ... are shown.
+  static constexpr std::size_t kMaxPoints = 100'000;
+
+  void Update(const LiveMap& map, double first_time_s);
+
+  int version() const { return version_; }
+  std::size_t num_points() const { return points_.size(); }
+
+  /// What has changed after a version, 0 for all. "points" and "keyframes" say how many rows there
+  /// are now ("count") and give those that changed, at "row"; where all have, "row" is left out.
+  nlohmann::ordered_json After(int version) const;
+
+ private:
+  struct Point {
+    TrackId track;
+    Eigen::Vector3f position;
+    std::array<std::uint8_t, 3> rgb = {};
+    int changed = 0;  // version
+    int seen = 0;     // version of the newest map that has it
+  };
+  struct Keyframe {
+    int frame = 0;
+    float time_s = 0.0F;  // since the first frame
+    Eigen::Vector4f quaternion;
+    Eigen::Vector3f position;
+    int part = 0;
+    int changed = 0;
+
+    bool IsSameAs(const Keyframe& other) const;
+  };
+
+  void UpdatePoints(const std::vector<LivePoint>& points);
+  void RemoveUnseenPoints();
+  void UpdateKeyframes(const std::vector<LiveKeyframe>& keyframes, double first_time_s);
+  nlohmann::ordered_json PointsAfter(int version) const;
+  nlohmann::ordered_json KeyframesAfter(int version) const;
+
+  int version_ = 0;
+  int revision_ = 0;
+  int num_corrections_ = 0;
+  int track_stride_ = 1;
+  std::vector<Point> points_;
+  std::unordered_map<int, std::size_t> row_of_track_;
+  std::vector<Keyframe> keyframes_;
+};
+
+}  // namespace rotslam

@@ -1,0 +1,220 @@
+#include "apps/slam/lens_estimation.h"
+
+#include <algorithm>
+#include <cmath>
+#include <optional>
+
+#include "apps/slam/build_map.h"
+#include "apps/slam/orientation_collector.h"
+#include "rotodom/self_calibration/find_lens.h"
+#include "rotodom/self_calibration/through_lens.h"
+
+namespace rotslam {
+namespace {
+
+// Enough motion to determine a lens, at a bounded time.
+constexpr int kMaxFrames = 600;
+
+// Rounds end when one changes the focal length by less than this share: orientations that are off
+// by as much are within what bundle adjustment corrects.
+constexpr double kTolerance = 0.02;
+constexpr int kMaxRounds = 3;
+
+// Features of a frame: a lens has a dozen parameters and needs fewer than a map.
+constexpr int kMaxFeatures = 700;
+
+// Frames that tell a lens well enough to start a run from: so many at least, and so many that turns
+// carry the picture so far, as a share of its longer side.
+constexpr std::size_t kFewestFrames = 150;
+constexpr double kEnoughTurn = 0.5;
+// Observations of each frame in their adjustment.
+constexpr int kObservationsToStart = 120;
+
+// Tells whoever observes the run of the frames of an estimate, and ends them once they tell enough.
+class FramesObserver final : public SlamObserver {
+ public:
+  // @param focal_px  of the lens that the frames are tracked through; it need not be right, since
+  //                  pixels are compared.
+  // @param side_px   longer side of the images.
+  FramesObserver(SlamObserver& observer, LensPurpose purpose, double focal_px, double side_px)
+      : observer_(observer),
+        ends_early_(purpose == LensPurpose::kStart),
+        enough_rad_(kEnoughTurn * side_px / focal_px) {}
+
+  void OnBegin(SlamStage stage, int num_steps) override { observer_.OnBegin(stage, num_steps); }
+  void OnFrame(const FrameProgress& progress) override {
+    observer_.OnFrame(progress);
+    const RotationMap& rotations = progress.odometry.cam_from_world;
+    // Tracking has started again.
+    if (rotations.size() == 1) largest_turn_rad_ = 0.0;
+    num_frames_ = rotations.size();
+    if (!ends_early_ || rotations.empty()) return;
+    const Rotation& newest = rotations.rbegin()->second;
+    for (const auto& [frame, rotation] : rotations) {
+      largest_turn_rad_ = std::max(largest_turn_rad_, (newest * rotation.Inverse()).Log().norm());
+    }
+  }
+  void OnReadoutFound(const ReadoutEstimate& readout) override {
+    observer_.OnReadoutFound(readout);
+  }
+  void OnStaticContent(const StaticContent& content) override {
+    observer_.OnStaticContent(content);
+  }
+  void OnEnd(SlamStage stage, const Orientations& orientations) override {
+    observer_.OnEnd(stage, orientations);
+  }
+  bool ShouldStop() override {
+    is_asked_ = observer_.ShouldStop();
+    return is_asked_ ||
+           (ends_early_ && num_frames_ >= kFewestFrames && largest_turn_rad_ >= enough_rad_);
+  }
+
+  // Whether the run is to be ended, not the estimate's frames alone.
+  bool is_asked() const { return is_asked_; }
+
+ private:
+  SlamObserver& observer_;
+  bool ends_early_;
+  double enough_rad_;
+  double largest_turn_rad_ = 0.0;
+  std::size_t num_frames_ = 0;
+  bool is_asked_ = false;
+};
+
+// Options without the stages that do not contribute to the lens.
+SlamOptions OptionsOfRounds(SlamOptions options, LensPurpose purpose) {
+  options.loop.use_loops = false;
+  options.rotodom.features.max_features =
+      std::min(options.rotodom.features.max_features, kMaxFeatures);
+  // Through a wrong lens another readout seems to fit.
+  options.readout.enabled = false;
+  options.krot.use_bracket = options.krot.start == KrotStart::kBisection;
+  options.relocalisation.enabled = false;
+  options.ba.find_covariance = false;
+  // The run makes the last adjustments.
+  if (purpose == LensPurpose::kStart) {
+    options.ba.preparing_observations = 0;
+    options.ba.max_final_rounds = 1;
+    // Of few observations steps cost little, and from a rough lens it takes many of them.
+    for (BundleRound* round : {&options.ba.coarse, &options.ba.fine}) {
+      round->max_iterations = 150;
+      round->function_tolerance = 1e-7;
+    }
+  }
+  return options;
+}
+
+// The lens that the pairs of views tell; nullopt: none.
+std::optional<Camera> LensOfPairs(const Orientations& orientations,
+                                  const LensGuess& guess,
+                                  const SlamOptions& options) {
+  const Camera& camera = guess.camera;
+  LensPairsOptions fit_options;
+  fit_options.relative_rotation = options.rotodom.relative_rotation;
+  fit_options.num_threads = options.num_threads;
+  const auto found = FindLens(ChooseLensPairs(orientations.features, orientations.cam_from_world),
+                              {camera.width, camera.height},
+                              guess.knows_focal ? std::optional(camera.MeanFocal()) : std::nullopt,
+                              fit_options);
+  if (!found) return std::nullopt;
+  return found->fit.camera;
+}
+
+// Orientations as they are through another lens.
+Orientations SeenThrough(const Camera& camera,
+                         const Orientations& orientations,
+                         const SlamOptions& options) {
+  Orientations seen = orientations;
+  static_cast<OdometryResult&>(seen) =
+      ThroughLens(orientations, camera, options.rotodom, options.seed, options.num_threads);
+  seen.camera = camera;
+  return seen;
+}
+
+}  // namespace
+
+double GuessFocalLength(const cv::Size& image_size) {
+  return 1.2 * std::max(image_size.width, image_size.height);
+}
+
+Camera UncalibratedCamera(const cv::Size& image_size, double focal_px) {
+  Camera camera;
+  camera.width = image_size.width;
+  camera.height = image_size.height;
+  camera.fx = camera.fy = focal_px;
+  camera.cx = 0.5 * (image_size.width - 1);
+  camera.cy = 0.5 * (image_size.height - 1);
+  return camera;
+}
+
+Camera PlainLens(const Camera& estimate) {
+  Camera plain = UncalibratedCamera({estimate.width, estimate.height}, estimate.MeanFocal());
+  plain.model = estimate.model;
+  return plain;
+}
+
+void FreeLens(const Camera& expected, LensOptions& lens) {
+  lens.refine_focal = true;
+  lens.refine_principal_point = true;
+  lens.refine_distortion = true;
+  lens.refine_higher_terms = true;
+  // Half of it: EstimateLens starts within a tenth.
+  lens.focal_sigma = 0.5;
+  // Observations err alike, so that these three are tighter than lenses differ. Looser ones let the
+  // principal point and the tangential coefficients trade with each other along a drive.
+  lens.principal_sigma = 0.01;
+  lens.distortion_sigma = 0.1;
+  lens.tangential_share = 0.005;
+  lens.expected = expected;
+  lens.min_gain = 0.0;
+}
+
+LensEstimate EstimateLens(FrameSource& frames,
+                          const LensGuess& guess,
+                          const SlamOptions& options,
+                          SlamObserver& observer,
+                          const OrientationInputs& inputs,
+                          LensPurpose purpose) {
+  LensEstimate estimate;
+  estimate.camera = guess.camera;
+  SlamOptions options_of_rounds = OptionsOfRounds(options, purpose);
+  OrientationInputs known;
+  known.masks = inputs.masks;
+  known.find_static_content = inputs.find_static_content;
+  known.static_content = inputs.static_content;
+  known.check_lens = false;
+  observer.OnLensRound(0, guess.camera);
+  FirstFrames beginning(frames, kMaxFrames);
+  FramesObserver frames_observer(observer,
+                                 purpose,
+                                 guess.camera.MeanFocal(),
+                                 std::max(guess.camera.width, guess.camera.height));
+  const Orientations tracked =
+      FindOrientations(beginning, guess.camera, options_of_rounds, known, frames_observer);
+  frames.Rewind();
+  estimate.interrupted = tracked.interrupted && frames_observer.is_asked();
+  if (estimate.interrupted || tracked.CameraStands()) return estimate;
+  estimate.static_content = tracked.static_content;
+  if (const auto by_pairs = LensOfPairs(tracked, guess, options)) {
+    estimate.camera = *by_pairs;
+    estimate.is_found = true;
+  }
+  for (int round = 1; round <= kMaxRounds; ++round) {
+    const double before_px = estimate.camera.MeanFocal();
+    observer.OnLensRound(round, estimate.camera);
+    FreeLens(PlainLens(estimate.camera), options_of_rounds.ba.lens);
+    const MapResult map =
+        BuildKeyframeMap(SeenThrough(estimate.camera, tracked, options),
+                         options_of_rounds,
+                         observer,
+                         purpose == LensPurpose::kStart ? kObservationsToStart : 0);
+    if (map.camera == estimate.camera || map.camera.Problem()) break;
+    estimate.camera = map.camera;
+    estimate.sigmas = map.lens_sigmas;
+    estimate.is_found = true;
+    if (std::abs(map.camera.MeanFocal() / before_px - 1.0) <= kTolerance) break;
+  }
+  return estimate;
+}
+
+}  // namespace rotslam

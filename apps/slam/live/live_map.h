@@ -1,0 +1,44 @@
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <vector>
+
+#include <Eigen/Core>
+
+#include "rotodom/types/ids.h"
+#include "rotodom/types/rotation.h"
+
+namespace rotslam {
+
+struct LiveKeyframe {
+  FrameId frame;
+  double timestamp_s = 0.0;
+  Rotation cam_from_world;
+  Eigen::Vector3d center_in_world = Eigen::Vector3d::Zero();
+  // Part of the map that it belongs to. The scale of a part against the one before is a guess:
+  // nothing that both see has a depth.
+  int part = 0;
+};
+
+struct LivePoint {
+  TrackId track;
+  Eigen::Vector3d point_in_world;
+  std::array<std::uint8_t, 3> rgb = {128, 128, 128};
+};
+
+/// The map of a live session as it stood once. It never changes; later ones have other objects.
+struct LiveMap {
+  int revision = 0;  // counts the maps, from 1
+  // Times that keyframes of long ago have moved, too: 0, since LiveSlam moves them at the end only.
+  int num_corrections = 0;
+  std::vector<LiveKeyframe> keyframes;  // by frame
+  std::vector<LivePoint> points;        // by track
+
+  /// The newest keyframe that has a position; null where there is none.
+  const LiveKeyframe* Newest() const { return keyframes.empty() ? nullptr : &keyframes.back(); }
+  /// Null where the map has no such point.
+  const LivePoint* FindPoint(TrackId track) const;
+};
+
+}  // namespace rotslam
