@@ -10,7 +10,7 @@
 #include "apps/slam/map/calibration_check.h"
 #include "apps/slam/map/cloud.h"
 #include "apps/slam/map/component_alignment.h"
-#include "apps/slam/map/pure_rotation.h"
+#include "apps/slam/map/pure_rotation_decision.h"
 #include "apps/slam/map/some_tracks.h"
 #include "apps/slam/map/stated_sigmas.h"
 #include "apps/slam/map_correction/map_correction.h"

@@ -3,7 +3,7 @@
 #include <optional>
 #include <vector>
 
-#include "ba/pure_rotation.h"
+#include "ba/rotation_adjustment.h"
 #include "rotodom/relative_rotation/relative_rotation.h"
 #include "rotodom/types/maps.h"
 #include "rotodom/types/pure_rotation_segment.h"

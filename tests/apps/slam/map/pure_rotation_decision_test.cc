@@ -1,4 +1,4 @@
-#include "apps/slam/map/pure_rotation.h"
+#include "apps/slam/map/pure_rotation_decision.h"
 
 #include <random>
 

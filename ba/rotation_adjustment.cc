@@ -1,4 +1,4 @@
-#include "ba/pure_rotation.h"
+#include "ba/rotation_adjustment.h"
 
 #include <algorithm>
 
