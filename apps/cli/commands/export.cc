@@ -1,7 +1,6 @@
 #include <array>
 #include <cstdio>
 #include <filesystem>
-#include <functional>
 #include <iterator>
 #include <map>
 #include <memory>
@@ -12,26 +11,16 @@
 #include <vector>
 
 #include "apps/cli/command.h"
-#include "apps/cli/commands/map_descriptors.h"
+#include "apps/cli/export/formats.h"
 #include "apps/cli/export/frame_images.h"
 #include "apps/cli/export/placed_frames.h"
 #include "apps/cli/export/undistort.h"
-#include "apps/cli/input/config.h"
 #include "apps/cli/run_directory/run_masks.h"
 #include "apps/cli/terminal/progress.h"
-#include "output/export/colmap_database.h"
-#include "output/export/colmap_model.h"
-#include "output/export/nerf.h"
-#include "output/export/openmvg.h"
-#include "output/export/stella_map.h"
-#include "output/graph/g2o.h"
 #include "output/map/map_keypoints.h"
-#include "output/map/ply.h"
 #include "output/map/run_map.h"
 #include "output/map/view_graph_matches.h"
-#include "output/tables/poses_csv.h"
 #include "output/tables/rotations_csv.h"
-#include "output/trajectory/trajectory.h"
 
 namespace rotslam {
 namespace {
@@ -51,171 +40,6 @@ struct ExportFlags {
   bool with_unplaced = false;
   bool text = false;
 };
-
-// What a format's writer gets.
-struct ExportJob {
-  RunMap map;  // of the frames to be written
-  fs::path run;
-  fs::path out;
-  fs::path image_folder;
-  const ViewGraphMatches* matches = nullptr;  // of all frames of the run
-  ImageChange image_change;                   // what --undistort does to images
-  int num_masks = 0;                          // in the folder masks beside `out`
-  bool text = false;
-  bool has_places = true;  // false: orientations alone
-  CommonFlags common;
-  std::function<void(const std::string&)> say;
-};
-
-void ExportColmap(const ExportJob& job) {
-  WriteColmapModel(job.out, job.map, job.text ? ColmapForm::kText : ColmapForm::kBinary);
-}
-
-void ExportColmapDatabase(const ExportJob& job) {
-  ColmapDatabaseOptions options;
-  if (!job.common.config.empty()) LoadOptionsYaml(job.common.config, options);
-  WriteColmapDatabase(job.out, job.map, *job.matches, options);
-}
-
-void ExportNerf(const ExportJob& job, NerfReader reader) {
-  for (const std::string& note : WriteNerfTransforms(job.out, job.map, job.image_folder, reader)) {
-    job.say("note: " + job.out.string() + ": " + note);
-  }
-}
-
-// The edges that were measured, between the poses that came out; those at other frames are left
-// out.
-void ExportG2o(const ExportJob& job) {
-  PoseGraph pose_graph = ReadG2o(job.run / "view_graph.g2o");
-  pose_graph.cam_from_world.clear();
-  pose_graph.center_in_world.clear();
-  for (const MapFrame& frame : job.map.frames) {
-    pose_graph.cam_from_world[frame.id] = frame.cam_from_world;
-    pose_graph.center_in_world[frame.id] = frame.center_in_world;
-  }
-  WriteG2o(job.out, pose_graph);
-}
-
-// One row per frame; what `rotslam rotations` leaves has no places.
-void ExportCsv(const ExportJob& job) {
-  std::vector<PoseRow> rows;
-  for (const MapFrame& frame : job.map.frames) {
-    PoseRow& row = rows.emplace_back();
-    row.frame = frame.id.value;
-    row.pose = {frame.timestamp_s, frame.cam_from_world.Inverse(), frame.center_in_world};
-    row.state = job.has_places ? PoseState::kMeasured : PoseState::kUnplaced;
-  }
-  if (job.has_places && fs::exists(job.run / "poses.csv")) {
-    std::map<int, PoseRow> known;
-    for (PoseRow& row : ReadPosesCsv(job.run / "poses.csv")) known[row.frame] = row;
-    for (PoseRow& row : rows) {
-      const auto found = known.find(row.frame);
-      if (found != known.end()) row = found->second;
-    }
-  }
-  WritePosesCsv(job.out, rows);
-}
-
-// Which frames of the run are written.
-enum class FrameChoice {
-  kAll,
-  kKeyframes,
-  kKeyframesAndAtRest,  // those in a pure rotation, which has keyframes at its ends alone, too
-};
-
-// How a format treats frames without a place, and components whose scales are not tied.
-enum class Places {
-  kApart,  // leaves those frames out, and has an output for each component
-  kOne,    // has a line for every frame, in their order, or no places at all
-};
-
-struct Format {
-  FrameChoice frames;  // unless told otherwise
-  bool has_points;
-  Places places;
-  const char* meaning;
-  std::function<void(const ExportJob&)> write;
-  bool names_masks = false;  // beside every frame
-};
-
-const std::map<std::string, Format>& Formats() {
-  static const std::map<std::string, Format> formats = {
-      {"colmap",
-       {FrameChoice::kKeyframes,
-        true,
-        Places::kApart,
-        "COLMAP model, a folder (--text)",
-        ExportColmap}},
-      {"colmap-db",
-       {FrameChoice::kKeyframesAndAtRest,
-        true,
-        Places::kOne,
-        "COLMAP database.db: keypoints, matches; frames of pure rotations, too",
-        ExportColmapDatabase}},
-      {"csv",
-       {FrameChoice::kAll,
-        false,
-        Places::kOne,
-        "a row per frame, as poses.csv has them",
-        ExportCsv}},
-      {"euroc",
-       {FrameChoice::kAll,
-        false,
-        Places::kApart,
-        "EuRoC's csv of poses",
-        [](const ExportJob& job) { WriteEurocTrajectory(job.out, ToTrajectory(job.map)); }}},
-      {"g2o", {FrameChoice::kAll, false, Places::kApart, "pose graph with information", ExportG2o}},
-      {"kitti",
-       {FrameChoice::kAll,
-        false,
-        Places::kOne,
-        "KITTI's 3x4 matrices",
-        [](const ExportJob& job) { WriteKittiTrajectory(job.out, ToTrajectory(job.map)); }}},
-      {"nerf",
-       {FrameChoice::kKeyframes,
-        true,
-        Places::kApart,
-        "transforms.json, as nerfstudio and instant-ngp read it alike, and a PLY file",
-        [](const ExportJob& job) { ExportNerf(job, NerfReader::kBoth); },
-        true}},
-      {"nerfstudio",
-       {FrameChoice::kKeyframes,
-        true,
-        Places::kApart,
-        "the same for nerfstudio alone: lenses keep k3",
-        [](const ExportJob& job) { ExportNerf(job, NerfReader::kNerfstudio); },
-        true}},
-      {"openmvg",
-       {FrameChoice::kKeyframes,
-        true,
-        Places::kApart,
-        "openMVG's sfm_data.json",
-        [](const ExportJob& job) { WriteOpenMvg(job.out, job.map, job.image_folder); }}},
-      {"ply",
-       {FrameChoice::kAll,
-        true,
-        Places::kApart,
-        "point cloud (--text)",
-        [](const ExportJob& job) {
-          WritePly(job.out,
-                   MakeCloud(ToReconstruction(job.map), job.map.camera),
-                   job.text ? PlyForm::kAscii : PlyForm::kBinary);
-        }}},
-      {"stella",
-       {FrameChoice::kKeyframes,
-        true,
-        Places::kApart,
-        "stella_vslam's map.msg; reads the images again",
-        [](const ExportJob& job) {
-          WriteStellaMap(
-              job.out, job.map, DescribeMap(job.map, job.image_folder, job.common.NumThreads()));
-        }}},
-      {"tum",
-       {FrameChoice::kAll, false, Places::kApart, "TUM trajectory", [](const ExportJob& job) {
-          WriteTumTrajectory(job.out, ToTrajectory(job.map));
-        }}}};
-  return formats;
-}
 
 // COLMAP's model_analyzer says the same: its mean is over the points.
 std::string DescribePoints(const RunMap& map) {
@@ -298,12 +122,6 @@ int WriteMasksBeside(const std::string& format, const ExportJob& job) {
       job.run, images, fs::absolute(job.out).parent_path() / "masks", job.image_change);
 }
 
-// Writes one file or model, with the paths of its masks.
-void Write(const Format& format, const ExportJob& job) {
-  format.write(job);
-  if (format.names_masks && job.num_masks > 0) AddMaskPaths(job.out);
-}
-
 // The files of a COLMAP model, whose components lie in folders of their own instead.
 void RemoveModel(const fs::path& folder) {
   for (const char* name : {"cameras", "images", "points3D"}) {
@@ -367,7 +185,7 @@ void ExportPlaced(const ExportFlags& flags,
     ExportJob job = whole;
     job.map = PartOf(whole.map, placed.components[k]);
     if (!is_one) job.out = PathOf(whole.out, flags, k);
-    Write(format, job);
+    WriteFormat(format, job);
     const std::string left_out = DescribeLeftOut(placed, k);
     progress.Say(DescribeOutput(job, format) + (left_out.empty() ? "" : "; " + left_out));
   }
@@ -478,7 +296,7 @@ int ExportOrientations(const ExportFlags& flags, const Format& format, Progress&
   job.has_places = false;
   job.common = flags.common;
   MakeParent(job.out);
-  Write(format, job);
+  WriteFormat(format, job);
   progress.Say(DescribeOutput(job, format) + ": orientations alone, all positions are zero");
   return 0;
 }
@@ -529,7 +347,7 @@ int Export(const ExportFlags& flags) {
     ExportPlaced(flags, format, job, progress);
     return 0;
   }
-  Write(format, job);
+  WriteFormat(format, job);
   progress.Say(DescribeOutput(job, format));
   return 0;
 }

@@ -1,4 +1,4 @@
-#include "apps/cli/commands/map_descriptors.h"
+#include "apps/cli/export/map_descriptors.h"
 
 #include <algorithm>
 #include <cmath>
