@@ -4,7 +4,6 @@
 #include <deque>
 #include <filesystem>
 #include <map>
-#include <memory>
 #include <optional>
 #include <set>
 #include <string>
@@ -13,29 +12,12 @@
 #include <opencv2/core/mat.hpp>
 
 #include "rotodom/sequence/image_file.h"
+#include "rotodom/sequence/video/ffmpeg_pointer.h"
 #include "rotodom/sequence/video/video_orientation.h"
 
-// FFmpeg's.
-struct AVCodecContext;
-struct AVFormatContext;
-struct AVFrame;
-struct AVPacket;
-struct AVStream;
-struct SwsContext;
+struct AVStream;  // FFmpeg's
 
 namespace rotslam {
-
-/// Frees what FFmpeg has made.
-struct FfmpegDeleter {
-  void operator()(AVCodecContext* codec) const;
-  void operator()(AVFormatContext* container) const;
-  void operator()(AVFrame* frame) const;
-  void operator()(AVPacket* packet) const;
-  void operator()(SwsContext* scaler) const;
-};
-
-template <class T>
-using FfmpegPointer = std::unique_ptr<T, FfmpegDeleter>;
 
 /// The frames of a video file in the order of presentation, decoded by FFmpeg's libraries.
 ///
