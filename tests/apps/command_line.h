@@ -144,6 +144,29 @@ inline std::vector<std::string> Lines(const std::string& text) {
   return lines;
 }
 
+/// What `rotslam run` leaves in its folder without a report, in the order of FileNames.
+inline const std::vector<std::string>& RunFiles() {
+  static const std::vector<std::string> files = {"camera.yaml",
+                                                 "cameras.ply",
+                                                 "cloud.ply",
+                                                 "keyframes_tum.txt",
+                                                 "known_rotation.txt",
+                                                 "loops.csv",
+                                                 "map.bin",
+                                                 "map_all_frames.bin",
+                                                 "matches.bin",
+                                                 "poses.csv",
+                                                 "rotations.csv",
+                                                 "rotations_tum.txt",
+                                                 "segments.csv",
+                                                 "summary.json",
+                                                 "thumbnails.bin",
+                                                 "trajectory_kitti.txt",
+                                                 "trajectory_tum.txt",
+                                                 "view_graph.g2o"};
+  return files;
+}
+
 /// Names of all files below a folder, relative to it, sorted; none where there is no folder.
 inline std::vector<std::string> FileNames(const std::filesystem::path& folder) {
   std::vector<std::string> names;
