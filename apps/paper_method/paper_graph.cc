@@ -13,7 +13,7 @@ namespace rotslam {
 namespace {
 
 // Deviation that files state of each edge: the method estimates none.
-constexpr double kEdgeSigmaDeg = 0.1;
+constexpr double kStatedSigmaDeg = 0.1;
 
 }  // namespace
 
@@ -23,7 +23,7 @@ PairSolver EigensolverPairs() {
             std::uint64_t seed) -> std::optional<RelativeRotation> {
     const auto estimate = EstimateByEigensolver(matches.pairs, start_j_from_i, seed);
     if (!estimate) return std::nullopt;
-    const double sigma_rad = kEdgeSigmaDeg * kRadFromDeg;
+    const double sigma_rad = kStatedSigmaDeg * kRadFromDeg;
     RelativeRotation edge;
     edge.i = matches.i;
     edge.j = matches.j;

@@ -12,7 +12,7 @@ namespace {
 // Levels that the two corners of a match may be apart (MRO).
 constexpr int kMaxLevels = 2;
 // Side of a cell in which a frame's features are listed, pixels.
-constexpr double kCellPx = 32.0;
+constexpr double kBucketPx = 32.0;
 // Classes of a patch's rotation, and how many of them stay (ORB-SLAM2).
 constexpr int kNumTurns = 12;
 constexpr int kNumTurnsKept = 3;
@@ -46,7 +46,7 @@ class Cells {
   }
 
  private:
-  static int CellOf(double px) { return static_cast<int>(std::max(0.0, px) / kCellPx); }
+  static int CellOf(double px) { return static_cast<int>(std::max(0.0, px) / kBucketPx); }
   std::vector<int>& At(int col, int row) {
     return cells_[static_cast<std::size_t>(row) * static_cast<std::size_t>(cols_) + col];
   }

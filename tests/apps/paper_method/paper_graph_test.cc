@@ -30,7 +30,7 @@ std::vector<PairMatches> MatchesOf(int frame, int reach, std::size_t count) {
   return matches;
 }
 
-RotationMap Run(const RotationGraph& scene, AveragingMode mode) {
+RotationMap Follow(const RotationGraph& scene, AveragingMode mode) {
   PaperGraphOptions options;
   options.averaging.mode = mode;
   options.solver = SolverOf(scene.graph);
@@ -42,13 +42,13 @@ RotationMap Run(const RotationGraph& scene, AveragingMode mode) {
 
 TEST(PaperGraph, ChainsWithoutAveragingAndIsBetterWith) {
   const RotationGraph scene = MakeRotationGraph({.num_views = 80});
-  const RotationMap chained = Run(scene, AveragingMode::kOff);
+  const RotationMap chained = Follow(scene, AveragingMode::kOff);
   for (const auto& [view, rotation] : chained) {
     EXPECT_LT((rotation * scene.chained_cam_from_world.at(view).Inverse()).AngleDeg(), 1e-9);
   }
   const RotationErrors off = CompareRotations(chained, scene.true_cam_from_world);
   const RotationErrors window =
-      CompareRotations(Run(scene, AveragingMode::kWindow), scene.true_cam_from_world);
+      CompareRotations(Follow(scene, AveragingMode::kWindow), scene.true_cam_from_world);
   EXPECT_LT(window.step_rms_deg, 0.8 * off.step_rms_deg);
 }
 

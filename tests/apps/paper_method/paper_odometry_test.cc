@@ -16,7 +16,7 @@ const SimulatedSequence& Street() {
   static const SimulatedSequence sequence = [] {
     SimulationOptions options;
     options.kind = SimulationKind::kStreet;
-    options.frames = 20;
+    options.frames = 12;
     options.camera = CameraWithView(620, 188, 80.0);
     return RenderSequence(options, 2);
   }();
@@ -26,7 +26,7 @@ const SimulatedSequence& Street() {
 PaperOdometryOptions SmallOptions() {
   PaperOdometryOptions options;
   options.odometry = PaperDefaults();
-  options.odometry.features.max_features = 1500;
+  options.odometry.features.max_features = 1000;
   return options;
 }
 
@@ -36,7 +36,7 @@ struct PaperRun {
   ViewGraph graph;
 };
 
-PaperRun Run(const SimulatedSequence& sequence, const PaperOdometryOptions& options) {
+PaperRun Follow(const SimulatedSequence& sequence, const PaperOdometryOptions& options) {
   PaperOdometry odometry(sequence.camera, options);
   PaperRun run;
   for (int k = 0; k < static_cast<int>(sequence.images.size()); ++k) {
@@ -61,7 +61,7 @@ double StepErrorDeg(const RotationMap& cam_from_world, const Trajectory& truth) 
 }
 
 TEST(PaperOdometry, FollowsAStreet) {
-  const PaperRun run = Run(Street(), SmallOptions());
+  const PaperRun run = Follow(Street(), SmallOptions());
   for (std::size_t k = 1; k < run.frames.size(); ++k) {
     EXPECT_FALSE(run.frames[k].predicted_only);
     EXPECT_EQ(run.frames[k].edges.size(), std::min<std::size_t>(k, 4));
@@ -71,26 +71,20 @@ TEST(PaperOdometry, FollowsAStreet) {
   EXPECT_LT(StepErrorDeg(run.cam_from_world, Street().truth), 0.06);
 }
 
-TEST(PaperOdometry, WindowIsBetterThanChaining) {
-  PaperOdometryOptions options = SmallOptions();
-  const double window_deg = StepErrorDeg(Run(Street(), options).cam_from_world, Street().truth);
-  options.odometry.averaging.mode = AveragingMode::kOff;
-  const double chained_deg = StepErrorDeg(Run(Street(), options).cam_from_world, Street().truth);
-  EXPECT_LT(window_deg, chained_deg);
-}
-
 TEST(PaperOdometry, GivesTheSameBytesForTheSameSeed) {
+  SimulatedSequence sequence = Street();
+  sequence.images.resize(5);
   PaperOdometryOptions options = SmallOptions();
-  const PaperRun one = Run(Street(), options);
+  const PaperRun one = Follow(sequence, options);
   options.num_threads = 3;
-  const PaperRun three = Run(Street(), options);
+  const PaperRun three = Follow(sequence, options);
   options.seed = 2;
-  const PaperRun other = Run(Street(), options);
+  const PaperRun other = Follow(sequence, options);
   bool differs = false;
   for (const auto& [frame, rotation] : one.cam_from_world) {
-    EXPECT_EQ(rotation.Quaternion().coeffs(), three.cam_from_world.at(frame).Quaternion().coeffs());
-    differs |=
-        rotation.Quaternion().coeffs() != other.cam_from_world.at(frame).Quaternion().coeffs();
+    const Eigen::Vector4d coefficients = rotation.Quaternion().coeffs();
+    EXPECT_EQ(coefficients, three.cam_from_world.at(frame).Quaternion().coeffs());
+    differs |= coefficients != other.cam_from_world.at(frame).Quaternion().coeffs();
   }
   EXPECT_TRUE(differs);
 }
@@ -102,7 +96,7 @@ TEST(PaperOdometry, GoesOnPastAFrameWithoutAnImage) {
   sequence.truth.resize(10);
   sequence.images[5] = cv::Mat();
   sequence.images[6] = cv::Mat(sequence.images[4].size(), CV_8U, cv::Scalar(90));
-  const PaperRun run = Run(sequence, SmallOptions());
+  const PaperRun run = Follow(sequence, SmallOptions());
   EXPECT_TRUE(run.frames[5].predicted_only);
   EXPECT_TRUE(run.frames[6].predicted_only);
   EXPECT_FALSE(run.frames[7].predicted_only);
@@ -117,10 +111,9 @@ TEST(PaperOdometry, GoesOnPastAFrameWithoutAnImage) {
 TEST(PaperOdometry, FindsALoop) {
   SimulatedSequence sequence;
   sequence.camera = Street().camera;
-  for (int k = 0; k < 20; ++k) sequence.images.push_back(Street().images[k]);
-  for (int k = 19; k >= 0; --k) sequence.images.push_back(Street().images[k]);
-  PaperOdometryOptions options = SmallOptions();
-  const PaperRun run = Run(sequence, options);
+  for (int k = 0; k < 12; ++k) sequence.images.push_back(Street().images[k]);
+  for (int k = 11; k >= 0; --k) sequence.images.push_back(Street().images[k]);
+  const PaperRun run = Follow(sequence, SmallOptions());
   const auto has_loop = [](const PaperFrame& frame) {
     return std::any_of(frame.loops.begin(), frame.loops.end(), [](const LoopCheck& check) {
       return check.accepted && check.frame.value - check.match.value > 10;
@@ -129,10 +122,8 @@ TEST(PaperOdometry, FindsALoop) {
   EXPECT_TRUE(std::any_of(run.frames.begin(), run.frames.end(), has_loop));
   // The last picture is the first.
   EXPECT_LT(
-      (run.cam_from_world.at(FrameId{39}) * run.cam_from_world.at(FrameId{0}).Inverse()).AngleDeg(),
+      (run.cam_from_world.at(FrameId{23}) * run.cam_from_world.at(FrameId{0}).Inverse()).AngleDeg(),
       0.1);
-  options.use_loops = false;
-  for (const PaperFrame& frame : Run(sequence, options).frames) EXPECT_TRUE(frame.loops.empty());
 }
 
 TEST(PaperOdometry, RefusesOptionsOutOfRange) {
