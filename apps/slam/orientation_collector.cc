@@ -10,6 +10,8 @@
 #include <utility>
 #include <vector>
 
+#include "apps/slam/connected_frames.h"
+
 namespace rotslam {
 namespace {
 

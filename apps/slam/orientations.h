@@ -78,15 +78,6 @@ struct OrientationInputs {
   bool check_lens = true;
 };
 
-/// The first frame of every connected component of the view-graph except the first one. Frames
-/// without an edge belong to none.
-/// @param cam_from_world  has an entry for each frame.
-std::vector<FrameId> FindBreaks(const ViewGraph& graph, const RotationMap& cam_from_world);
-
-/// Throws std::runtime_error, in one line that says what to look at, where there are fewer than
-/// three frames or no edges.
-void RequireFramesAndEdges(const Orientations& orientations);
-
 /// Interpolates the orientation of the frames in `unknown` in time between the nearest other
 /// frames. Call it again once those have been refined. Frames with given orientations keep these,
 /// rotated as the frames beside them were.

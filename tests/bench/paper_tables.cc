@@ -466,21 +466,33 @@ std::string NameOf(std::string path) {
   return path.substr(path.find_last_of('/') + 1);
 }
 
-Results Measure(const Arguments::Input& input, const Arguments& arguments) {
-  SequenceOptions sequence_options;
-  sequence_options.last = arguments.last;
-  const std::unique_ptr<Sequence> sequence = OpenSequence(input.path, sequence_options);
-  if (input.camera.empty() && !sequence->camera_reference()) {
+// A sequence with all that it is scored by.
+struct OpenedInput {
+  std::unique_ptr<Sequence> sequence;
+  Camera camera;
+  TrajectoryFile truth;
+};
+
+OpenedInput Open(const Arguments::Input& input, int last) {
+  SequenceOptions options;
+  options.last = last;
+  OpenedInput opened;
+  opened.sequence = OpenSequence(input.path, options);
+  const auto& reference = opened.sequence->camera_reference();
+  if (input.camera.empty() && !reference) {
     throw std::runtime_error(input.path + ": no calibration lies with the images; name --camera");
   }
-  if (!sequence->GroundTruthFile()) throw std::runtime_error(input.path + ": no ground truth");
-  const Camera camera =
-      MatchToImages(ReadCamera(input.camera.empty() ? *sequence->camera_reference()
-                                                    : ParseCameraReference(input.camera)),
-                    sequence->image_size());
-  const fs::path truth_file = *sequence->GroundTruthFile();
-  TrajectoryFile truth = ReadTrajectoryFile(truth_file, TimesBeside(truth_file));
+  const auto& truth_file = opened.sequence->GroundTruthFile();
+  if (!truth_file) throw std::runtime_error(input.path + ": no ground truth lies with the images");
+  opened.camera = MatchToImages(
+      ReadCamera(input.camera.empty() ? *reference : ParseCameraReference(input.camera)),
+      opened.sequence->image_size());
+  opened.truth = ReadTrajectoryFile(*truth_file, TimesBeside(*truth_file));
+  return opened;
+}
 
+Results Measure(const Arguments::Input& input, const Arguments& arguments) {
+  const auto [sequence, camera, truth] = Open(input, arguments.last);
   const auto vocabulary = std::make_shared<const Vocabulary>(DefaultVocabulary());
   const OdometryOptions paper = PaperDefaults();
   std::vector<std::unique_ptr<Theirs>> theirs;
@@ -529,8 +541,9 @@ Results Measure(const Arguments::Input& input, const Arguments& arguments) {
   ours.Finish();
   std::fprintf(stderr, "\n");
 
+  const TrajectoryFile& true_path = truth;
   const auto score = [&](const RotationMap& rotations) {
-    return ScoreOf(rotations, timestamps_s, truth);
+    return ScoreOf(rotations, timestamps_s, true_path);
   };
   std::map<std::string, std::vector<Score>> scores;
   for (const auto& run : theirs) {
@@ -670,6 +683,8 @@ void WriteRuntime(const std::string& path, const std::vector<Results>& all) {
 
 int Main(int argc, char** argv) {
   const Arguments arguments = Parse(argc, argv);
+  // What cannot be measured is told before the first hour has gone by.
+  for (const Arguments::Input& input : arguments.inputs) Open(input, arguments.last);
   std::vector<Results> all;
   for (const Arguments::Input& input : arguments.inputs) all.push_back(Measure(input, arguments));
   PrintTables(all);

@@ -6,15 +6,13 @@
 
 namespace rotslam {
 
-RunOptions PaperRunOptions() {
+RunOptions ReadPaperOptions(const CommonFlags&, const InputFlags&) {
   throw std::runtime_error(
       "--method paper: this program was built without OpenGV; configure the build with "
       "-DROTSLAM_WITH_OPENGV=ON");
 }
 
-Orientations FindPaperOrientations(TrackedInput&, const OrientationInputs&) {
-  PaperRunOptions();  // throws
-  return {};
-}
+// Not reached: the options come first.
+Orientations FindPaperOrientations(TrackedInput&, const OrientationInputs&) { return {}; }
 
 }  // namespace rotslam

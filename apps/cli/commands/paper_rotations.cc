@@ -4,8 +4,10 @@
 #include <optional>
 #include <utility>
 
+#include "apps/cli/input/config.h"
 #include "apps/paper_method/paper_odometry.h"
 #include "apps/paper_method/paper_options.h"
+#include "apps/slam/connected_frames.h"
 
 namespace rotslam {
 namespace {
@@ -48,9 +50,14 @@ void ClassifyFrames(const AveragingOptions& averaging, Orientations& orientation
 
 }  // namespace
 
-RunOptions PaperRunOptions() {
-  RunOptions options;
+RunOptions ReadPaperOptions(const CommonFlags& common, const InputFlags& input) {
+  CommonFlags without_config = common;
+  without_config.config.clear();
+  RunOptions options = ReadRunOptions(without_config, input);
   options.rotodom = PaperDefaults();
+  if (!common.config.empty()) LoadOptionsYaml(common.config, options);
+  input.Override(options.sequence);
+  input.Override(options.loop);
   return options;
 }
 

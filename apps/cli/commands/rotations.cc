@@ -37,8 +37,8 @@ int FindAndWriteRotations(const RotationsFlags& flags) {
   const bool is_paper = flags.method == "paper";
   if (is_paper) CheckPaperFlags(flags.track);
   // The whole pipeline's options, so that one configuration file serves `run` and `rotations`.
-  RunOptions options = ReadRunOptions(
-      flags.track.common, flags.track.input, is_paper ? PaperRunOptions() : RunOptions());
+  RunOptions options = is_paper ? ReadPaperOptions(flags.track.common, flags.track.input)
+                                : ReadRunOptions(flags.track.common, flags.track.input);
   if (!flags.averaging.empty()) ChoiceField(options.rotodom.averaging.mode).Assign(flags.averaging);
   TrackedInput tracked("rotations",
                        flags.track,

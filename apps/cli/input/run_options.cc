@@ -1,7 +1,6 @@
 #include "apps/cli/input/run_options.h"
 
 #include <stdexcept>
-#include <utility>
 
 #include "apps/cli/input/config.h"
 #include "output/files/option_list.h"
@@ -36,16 +35,16 @@ void AddKrotFlags(CLI::App& command, KrotFlags& flags) {
                    "Do not bound how far the largest residual is from the least possible");
 }
 
-RunOptions ReadRunOptions(const CommonFlags& common, RunOptions defaults) {
-  RunOptions options = std::move(defaults);
+RunOptions ReadRunOptions(const CommonFlags& common) {
+  RunOptions options;
   if (!common.config.empty()) LoadOptionsYaml(common.config, options);
   options.seed = options.krot.seed = common.seed;
   options.num_threads = common.NumThreads();
   return options;
 }
 
-RunOptions ReadRunOptions(const CommonFlags& common, const InputFlags& input, RunOptions defaults) {
-  RunOptions options = ReadRunOptions(common, std::move(defaults));
+RunOptions ReadRunOptions(const CommonFlags& common, const InputFlags& input) {
+  RunOptions options = ReadRunOptions(common);
   input.Override(options.sequence);
   input.Override(options.loop);
   return options;

@@ -34,9 +34,7 @@ struct KrotFlags {
 void AddKrotFlags(CLI::App& command, KrotFlags& flags);
 
 /// The defaults, overridden by the configuration file and then by the flags.
-RunOptions ReadRunOptions(const CommonFlags& common, RunOptions defaults = {});
-RunOptions ReadRunOptions(const CommonFlags& common,
-                          const InputFlags& input,
-                          RunOptions defaults = {});
+RunOptions ReadRunOptions(const CommonFlags& common);
+RunOptions ReadRunOptions(const CommonFlags& common, const InputFlags& input);
 
 }  // namespace rotslam
