@@ -110,7 +110,7 @@ std::vector<std::optional<RelativeRotation>> PaperGraph::VerifyLoops(
   if (cam_from_world_.empty()) return {};
   const FrameId newest = cam_from_world_.rbegin()->first;
   const Rotation start = RelativeRotationOf(FrameId{newest.value - 1}, newest);
-  return EstimateAll(candidates, [&](const PairMatches&) { return start; });
+  return EstimateAll(candidates, [&start](const PairMatches&) { return Rotation(start); });
 }
 
 void PaperGraph::CloseLoops(std::span<const RelativeRotation> edges) {

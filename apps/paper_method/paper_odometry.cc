@@ -78,9 +78,11 @@ PaperFrame PaperOdometry::AddFrame(FrameId frame, const MaskedImage& image) {
 void PaperOdometry::FindLoops(std::shared_ptr<const OrbView> view, PaperFrame& result) {
   const Stopwatch watch(seconds_.loops);
   std::vector<FrameId> neighbours;
+  neighbours.reserve(result.edges.size());
   for (const RelativeRotation& edge : result.edges) neighbours.push_back(edge.i);
   const std::vector<PaperLoop> loops = loops_->AddFrame(std::move(view), neighbours);
   std::vector<PairMatches> matches;
+  matches.reserve(loops.size());
   for (const PaperLoop& loop : loops) matches.push_back(loop.matches);
   const std::vector<std::optional<RelativeRotation>> verified = graph_.VerifyLoops(matches);
   std::vector<RelativeRotation> accepted;

@@ -28,8 +28,12 @@ std::array<Part, 4> Quarters(const Part& part) {
   const double height = 0.5 * part.area.height;
   std::array<Part, 4> quarters;
   for (int k = 0; k < 4; ++k) {
-    quarters[k].area = {
-        part.area.x + (k % 2) * width, part.area.y + (k / 2) * height, width, height};
+    const bool is_right = k % 2 == 1;
+    const bool is_below = k >= 2;
+    quarters[k].area = {part.area.x + (is_right ? width : 0.0),
+                        part.area.y + (is_below ? height : 0.0),
+                        width,
+                        height};
   }
   for (const FastCorner& corner : part.corners) {
     const int right = corner.x >= quarters[1].area.x ? 1 : 0;
