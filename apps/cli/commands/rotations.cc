@@ -5,8 +5,8 @@
 #include <vector>
 
 #include "apps/cli/command.h"
-#include "apps/cli/commands/paper_rotations.h"
 #include "apps/cli/commands/track_input.h"
+#include "apps/cli/paper/paper_rotations.h"
 #include "apps/cli/run_directory/run_directory.h"
 #include "apps/cli/run_directory/run_report.h"
 #include "apps/cli/run_directory/summary_parts.h"
@@ -33,6 +33,14 @@ void CheckPaperFlags(const TrackFlags& flags) {
   }
 }
 
+Orientations FindByPaper(TrackedInput& tracked, const OrientationInputs& inputs) {
+  return FindPaperOrientations(tracked.frames,
+                               tracked.working.Reduced(tracked.input.camera),
+                               tracked.options,
+                               inputs,
+                               tracked.observer);
+}
+
 int FindAndWriteRotations(const RotationsFlags& flags) {
   const bool is_paper = flags.method == "paper";
   if (is_paper) CheckPaperFlags(flags.track);
@@ -44,7 +52,7 @@ int FindAndWriteRotations(const RotationsFlags& flags) {
                        flags.track,
                        std::move(options),
                        false,
-                       is_paper ? FindPaperOrientations : TrackedInput::Tracking());
+                       is_paper ? FindByPaper : TrackedInput::Tracking());
   const std::filesystem::path& directory = tracked.directory;
   const Input& input = tracked.input;
   const Orientations& orientations = tracked.orientations;

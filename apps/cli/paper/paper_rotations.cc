@@ -1,4 +1,4 @@
-#include "apps/cli/commands/paper_rotations.h"
+#include "apps/cli/paper/paper_rotations.h"
 
 #include <algorithm>
 #include <optional>
@@ -12,14 +12,14 @@
 namespace rotslam {
 namespace {
 
-PaperOdometryOptions OptionsOf(const TrackedInput& input, const OrientationInputs& inputs) {
+PaperOdometryOptions OptionsOf(const SlamOptions& slam, const OrientationInputs& inputs) {
   PaperOdometryOptions options;
-  options.odometry = input.options.rotodom;
-  options.use_loops = input.options.loop.use_loops;
-  options.candidates = input.options.loop.candidates;
+  options.odometry = slam.rotodom;
+  options.use_loops = slam.loop.use_loops;
+  options.candidates = slam.loop.candidates;
   options.vocabulary = inputs.vocabulary;
-  options.seed = input.options.seed;
-  options.num_threads = input.options.num_threads;
+  options.seed = slam.seed;
+  options.num_threads = slam.num_threads;
   return options;
 }
 
@@ -61,14 +61,18 @@ RunOptions ReadPaperOptions(const CommonFlags& common, const InputFlags& input) 
   return options;
 }
 
-Orientations FindPaperOrientations(TrackedInput& input, const OrientationInputs& inputs) {
+Orientations FindPaperOrientations(FrameSource& frames,
+                                   const Camera& camera,
+                                   const SlamOptions& options,
+                                   const OrientationInputs& inputs,
+                                   SlamObserver& observer) {
   Orientations orientations;
-  orientations.camera = input.working.Reduced(input.input.camera);
+  orientations.camera = camera;
   orientations.masks = inputs.masks;
-  PaperOdometry odometry(orientations.camera, OptionsOf(input, inputs));
-  input.observer.OnBegin(SlamStage::kOrientations, input.frames.NumFrames());
+  PaperOdometry odometry(camera, OptionsOf(options, inputs));
+  observer.OnBegin(SlamStage::kOrientations, frames.NumFrames());
   while (!orientations.interrupted) {
-    std::optional<Frame> frame = input.frames.Next();
+    std::optional<Frame> frame = frames.Next();
     if (!frame) break;
     const Mask mask = frame->image.empty() ? Mask() : orientations.masks.Of(frame->name);
     const PaperFrame found = odometry.AddFrame(frame->id, {frame->image, mask});
@@ -82,8 +86,8 @@ Orientations FindPaperOrientations(TrackedInput& input, const OrientationInputs&
     orientations.loops.insert(orientations.loops.end(), found.loops.begin(), found.loops.end());
     for (const RelativeRotation& edge : found.edges) orientations.graph.AddEdge(edge);
     orientations.cam_from_world[found.frame] = found.cam_from_world;
-    input.observer.OnFrame({*frame, estimate, orientations});
-    orientations.interrupted = input.observer.ShouldStop();
+    observer.OnFrame({*frame, estimate, orientations});
+    orientations.interrupted = observer.ShouldStop();
   }
   orientations.graph = odometry.graph();
   orientations.cam_from_world = odometry.cam_from_world();
@@ -95,8 +99,8 @@ Orientations FindPaperOrientations(TrackedInput& input, const OrientationInputs&
   orientations.loop_seconds.verification = seconds.loops;
   if (orientations.interrupted && !orientations.IsUsable()) return orientations;
   RequireFramesAndEdges(orientations);
-  ClassifyFrames(input.options.rotodom.averaging, orientations);
-  input.observer.OnEnd(SlamStage::kOrientations, orientations);
+  ClassifyFrames(options.rotodom.averaging, orientations);
+  observer.OnEnd(SlamStage::kOrientations, orientations);
   return orientations;
 }
 

@@ -2,7 +2,7 @@
 
 #include <stdexcept>
 
-#include "apps/cli/commands/paper_rotations.h"
+#include "apps/cli/paper/paper_rotations.h"
 
 namespace rotslam {
 
@@ -13,6 +13,9 @@ RunOptions ReadPaperOptions(const CommonFlags&, const InputFlags&) {
 }
 
 // Not reached: the options come first.
-Orientations FindPaperOrientations(TrackedInput&, const OrientationInputs&) { return {}; }
+Orientations FindPaperOrientations(
+    FrameSource&, const Camera&, const SlamOptions&, const OrientationInputs&, SlamObserver&) {
+  return {};
+}
 
 }  // namespace rotslam
