@@ -23,16 +23,6 @@ struct RotationsFlags {
   bool use_report = true;
 };
 
-// Throws std::runtime_error for what the paper's method does not do.
-void CheckPaperFlags(const TrackFlags& flags) {
-  if (flags.checkpoint.resume) {
-    throw std::runtime_error("--method paper writes no checkpoints, so --resume finds none");
-  }
-  if (!flags.input.rotations.empty()) {
-    throw std::runtime_error("--method paper takes no orientations from --rotations");
-  }
-}
-
 Orientations FindByPaper(TrackedInput& tracked, const OrientationInputs& inputs) {
   return FindPaperOrientations(tracked.frames,
                                tracked.working.Reduced(tracked.input.camera),
@@ -43,7 +33,9 @@ Orientations FindByPaper(TrackedInput& tracked, const OrientationInputs& inputs)
 
 int FindAndWriteRotations(const RotationsFlags& flags) {
   const bool is_paper = flags.method == "paper";
-  if (is_paper) CheckPaperFlags(flags.track);
+  if (is_paper && flags.track.checkpoint.resume) {
+    throw std::runtime_error("--method paper writes no checkpoints, so --resume finds none");
+  }
   // The whole pipeline's options, so that one configuration file serves `run` and `rotations`.
   RunOptions options = is_paper ? ReadPaperOptions(flags.track.common, flags.track.input)
                                 : ReadRunOptions(flags.track.common, flags.track.input);
