@@ -22,8 +22,10 @@ packages=(
   pybind11-dev python3-dev python3-numpy
   # the report and the plots; the page of a live session
   libcairo2-dev libjs-three libcpp-httplib-dev
-  # tests; GLPK and OpenGV to compare with
-  libglpk-dev libgmock-dev libgtest-dev libopengv-dev
+  # the paper's method
+  libopengv-dev
+  # tests; GLPK to compare with
+  libglpk-dev libgmock-dev libgtest-dev
 )
 # Not needed: libbenchmark-dev, for the benchmarks (ROTSLAM_BUILD_BENCHMARKS).
 if [[ ${1:-} == --ci ]]; then

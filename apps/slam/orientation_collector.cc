@@ -10,24 +10,10 @@
 #include <utility>
 #include <vector>
 
-#include "rotodom/types/disjoint_sets.h"
+#include "apps/slam/connected_frames.h"
 
 namespace rotslam {
 namespace {
-
-// The first frame of every connected component of the view-graph except the first one.
-std::vector<FrameId> FindBreaks(const ViewGraph& graph, const RotationMap& rotations) {
-  DisjointSets pieces;
-  for (const RelativeRotation& edge : graph.edges()) pieces.Join(edge.i.value, edge.j.value);
-  std::vector<FrameId> breaks;
-  bool is_first = true;
-  for (const auto& [frame, rotation] : rotations) {
-    if (graph.EdgesOf(frame).empty()) continue;
-    if (pieces.Find(frame.value) == frame.value && !is_first) breaks.push_back(frame);
-    is_first = false;
-  }
-  return breaks;
-}
 
 // The places of loops that were rejected, and some places before and after them.
 std::map<FrameId, Features> PlacesOfRejectedLoops(std::map<FrameId, Features> places,
@@ -91,20 +77,6 @@ void TakeResults(LoopedOdometry& odometry, bool keep_features, Orientations& ori
   orientations.loop_seconds = odometry.loop_seconds();
   orientations.global_averaging_seconds = odometry.averaging_seconds();
   static_cast<OdometryResult&>(orientations) = odometry.TakeResult();
-}
-
-void RequireFramesAndEdges(const Orientations& orientations) {
-  const std::size_t num_frames = orientations.timestamps_s.size();
-  if (num_frames < 3) {
-    throw std::runtime_error("only " + std::to_string(num_frames) +
-                             " frames could be read; at least 3 are needed");
-  }
-  if (orientations.graph.edges().empty()) {
-    throw std::runtime_error(
-        "no two of the " + std::to_string(num_frames) +
-        " frames could be matched: the images show too few corners in common; check "
-        "that they are in focus, exposed and in order");
-  }
 }
 
 // Whether orientations are given for the frames on both sides of a break.

@@ -1,9 +1,12 @@
 #include <memory>
+#include <stdexcept>
 #include <string>
 #include <utility>
+#include <vector>
 
 #include "apps/cli/command.h"
 #include "apps/cli/commands/track_input.h"
+#include "apps/cli/paper/paper_rotations.h"
 #include "apps/cli/run_directory/run_directory.h"
 #include "apps/cli/run_directory/run_report.h"
 #include "apps/cli/run_directory/summary_parts.h"
@@ -15,23 +18,42 @@ namespace {
 
 struct RotationsFlags {
   TrackFlags track;
+  std::string method = "ours";
   std::string averaging;  // empty: as the configuration says
   bool use_report = true;
 };
 
+Orientations FindByPaper(TrackedInput& tracked, const OrientationInputs& inputs) {
+  return FindPaperOrientations(tracked.frames,
+                               tracked.working.Reduced(tracked.input.camera),
+                               tracked.options,
+                               inputs,
+                               tracked.observer);
+}
+
 int FindAndWriteRotations(const RotationsFlags& flags) {
+  const bool is_paper = flags.method == "paper";
+  if (is_paper && flags.track.checkpoint.resume) {
+    throw std::runtime_error("--method paper writes no checkpoints, so --resume finds none");
+  }
   // The whole pipeline's options, so that one configuration file serves `run` and `rotations`.
-  RunOptions options = ReadRunOptions(flags.track.common, flags.track.input);
+  RunOptions options = is_paper ? ReadPaperOptions(flags.track.common, flags.track.input)
+                                : ReadRunOptions(flags.track.common, flags.track.input);
   if (!flags.averaging.empty()) ChoiceField(options.rotodom.averaging.mode).Assign(flags.averaging);
-  TrackedInput tracked("rotations", flags.track, std::move(options), false);
+  TrackedInput tracked("rotations",
+                       flags.track,
+                       std::move(options),
+                       false,
+                       is_paper ? FindByPaper : TrackedInput::Tracking());
   const std::filesystem::path& directory = tracked.directory;
   const Input& input = tracked.input;
   const Orientations& orientations = tracked.orientations;
   Progress& progress = tracked.progress;
 
   tracked.ToOriginalSize();
-  RunSummary summary =
-      StartSummary("rotations", input, orientations, DescribeOptions(tracked.options));
+  std::vector<OptionEntry> option_list = DescribeOptions(tracked.options);
+  if (is_paper) option_list.insert(option_list.begin(), {"method", flags.method});
+  RunSummary summary = StartSummary("rotations", input, orientations, std::move(option_list));
   if (input.guess) summary.seconds.push_back({"lens", tracked.lens_s});
   summary.seconds.push_back({"total", SecondsSince(tracked.start)});
   WriteSummary(tracked.outputs.folder() / "summary.json", summary);
@@ -58,6 +80,14 @@ void AddRotationsCommand(CLI::App& app, Action& action) {
       "Every frame's orientation from a sequence, without positions (rotational odometry)");
   AddInputFlags(*command, flags->track.input);
   AddCheckpointFlags(*command, flags->track.checkpoint);
+  command
+      ->add_option(
+          "--method",
+          flags->method,
+          "ours, or paper: the method of Chng et al. (DICTA 2020) as published, to compare "
+          "with; slower and without covariances")
+      ->check(CLI::IsMember({"ours", "paper"}))
+      ->capture_default_str();
   command
       ->add_option("--averaging",
                    flags->averaging,
