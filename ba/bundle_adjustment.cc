@@ -184,13 +184,16 @@ class Rounds {
   // Of what the state holds now.
   void FindCovariances(const BundleRound& round, BundleState& state) {
     if (!options_.find_covariance && !(options_.find_lens_covariance && refine_lens_)) return;
+    FindLensNoise(state);
     const auto found = rotslam::FindCovariances(calibrated_, round, refine_lens_, options_, state);
     if (!found) return;
     for (std::size_t k = 0; k < state.frames.size(); ++k) {
       if (found->poses[k]) result_.pose_covariance[state.frames[k].id] = *found->poses[k];
     }
-    if (found->lens_variances) {
-      result_.summary.lens_sigmas = SigmasOf(*found->lens_variances);
+    if (found->lens) {
+      const LensCovariance covariance = state.lens_noise * state.lens_noise * *found->lens;
+      result_.summary.lens_sigmas = SigmasOf(covariance.diagonal());
+      result_.summary.lens_covariance = covariance;
     }
   }
 
@@ -198,6 +201,11 @@ class Rounds {
   const BundleRound& last() const { return last_; }
 
  private:
+  void FindLensNoise(BundleState& state) const {
+    if (!options_.lens.weighs_by_residuals) return;
+    state.lens_noise = kCommonErrors * std::max(kLeastSpread, ResidualSpread(state));
+  }
+
   // Zero for what was held.
   LensSigmas SigmasOf(const LensParameters& variances) const {
     const LensParameters priors = options_.lens.Sigmas(calibrated_.model);
@@ -208,6 +216,7 @@ class Rounds {
                 const BundleRound& round,
                 std::chrono::steady_clock::time_point start,
                 BundleState& state) {
+    if (refine_lens_ && moves_lens_) FindLensNoise(state);
     const std::optional<MinimisationResult> minimised =
         rotslam::Minimise(calibrated_, round, refine_lens_ && moves_lens_, options_, state);
     good_ = minimised.has_value();

@@ -57,6 +57,7 @@ PureRotationResult RefinePureRotation(const Camera& camera,
   result.camera = refined.camera;
   result.lens_refined = refined.summary.lens_refined;
   result.lens_sigmas = refined.summary.lens_sigmas;
+  result.lens_covariance = refined.summary.lens_covariance;
   if (refined.summary.rounds.empty()) return result;
   const BundleRoundSummary& last = refined.summary.rounds.back();
   result.num_directions = last.num_directions;

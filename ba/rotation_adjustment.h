@@ -14,6 +14,7 @@ struct PureRotationResult {
   Camera camera;               // with its lens refined, if that gains enough (LensOptions)
   bool lens_refined = false;   // whether it did
   std::optional<LensSigmas> lens_sigmas;  // of a refined lens, see BundleSummary
+  std::optional<LensCovariance> lens_covariance;
   // Tracks, and observations of them, that one direction each explains.
   int num_directions = 0;
   int num_observations = 0;

@@ -172,6 +172,14 @@ Json KeyframesData(const RunMap& map) {
           {"tan_y", 0.5 * map.camera.height / map.camera.fy}};
 }
 
+Json LensDataOf(const LensData& lens) {
+  return {{"is_estimated", lens.is_estimated},
+          {"radius_px", lens.radius_px},
+          {"displacement_px", lens.displacement_px},
+          {"sigma_px", lens.sigma_px},
+          {"given_px", lens.given_px}};
+}
+
 Json GraphData(const RunData& run, const PageLimits& limits) {
   const int step = StepFor(run.edges.size(), limits.max_edges);
   std::vector<std::int32_t> frames;
@@ -347,6 +355,7 @@ Json PageData(const RunData& run, const Thumbnails& thumbnails, const PageLimits
   if (run.cloud) data["cloud"] = CloudData(*run.cloud, limits);
   if (run.keyframe_map) data["keyframes"] = KeyframesData(*run.keyframe_map);
   if (run.truth) data["truth"] = TruthJson(run, step);
+  if (run.lens && !run.lens->radius_px.empty()) data["lens"] = LensDataOf(*run.lens);
   return data;
 }
 

@@ -231,6 +231,75 @@ function drawBracket(canvas, low, high) {
   for (const value of scale.list) context.fillText(value.toFixed(scale.decimals), Math.min(width - 12, x(value)), 54);
 }
 
+// The lens' distortion over the distance from the principal point, with a band of one standard deviation.
+function drawLens(canvas, lens) {
+  const ratio = window.devicePixelRatio || 1, width = canvas.clientWidth, height = canvas.clientHeight;
+  canvas.width = width * ratio;
+  canvas.height = height * ratio;
+  const context = canvas.getContext('2d');
+  context.scale(ratio, ratio);
+  context.font = '11px system-ui, sans-serif';
+  const sigma = lens.radius_px.map((_, k) => lens.sigma_px[k] || 0);
+  const given = lens.given_px.filter((value) => value !== null);
+  const low = Math.min(0, ...given, ...lens.displacement_px.map((value, k) => value - sigma[k]));
+  const high = Math.max(0, ...given, ...lens.displacement_px.map((value, k) => value + sigma[k]));
+  const margin = 0.06 * Math.max(high - low, 0.1);
+  const end = lens.radius_px[lens.radius_px.length - 1];
+  const x = (value) => 58 + (width - 68) * value / end;
+  const y = (value) => 8 + (height - 48) * (high + margin - value) / (high - low + 2 * margin);
+  context.fillStyle = color('muted');
+  context.strokeStyle = color('grid');
+  const line = (points) => {
+    context.beginPath();
+    points.forEach(([a, b], k) => (k === 0 ? context.moveTo(a, b) : context.lineTo(a, b)));
+  };
+  const across = ticks(0, end, width / 80), up = ticks(low - margin, high + margin, height / 45);
+  context.textAlign = 'center';
+  for (const value of across.list) {
+    line([[x(value), 8], [x(value), height - 40]]);
+    context.stroke();
+    context.fillText(value.toFixed(across.decimals), x(value), height - 26);
+  }
+  context.fillText('distance from the principal point, px', x(0.5 * end), height - 8);
+  context.textAlign = 'right';
+  for (const value of up.list) {
+    line([[x(0), y(value)], [x(end), y(value)]]);
+    context.stroke();
+    context.fillText(value.toFixed(up.decimals), 52, y(value) + 4);
+  }
+  const at = (values) => values.map((value, k) => [x(lens.radius_px[k]), y(value)]);
+  if (lens.sigma_px.length > 0) {
+    line([...at(lens.displacement_px.map((value, k) => value + sigma[k])),
+      ...at(lens.displacement_px.map((value, k) => value - sigma[k])).reverse()]);
+    context.globalAlpha = 0.25;
+    context.fillStyle = color('blue');
+    context.fill();
+    context.globalAlpha = 1;
+  }
+  context.lineWidth = 1.6;
+  context.strokeStyle = color('blue');
+  line(at(lens.displacement_px));
+  context.stroke();
+  context.setLineDash([5, 4]);
+  context.strokeStyle = color('orange');
+  line(at(lens.given_px).filter((_, k) => lens.given_px[k] !== null));
+  context.stroke();
+}
+
+function buildLens(parent) {
+  const lens = data.lens;
+  if (!lens) return;
+  const canvas = h('canvas', {id: 'lens'});
+  Object.assign(canvas.style, {width: '100%', height: '240px', display: 'block'});
+  panel(parent, 'Lens: distortion over the image’s radius, px', canvas,
+    h('p', {class: 'source'}, (lens.is_estimated ? 'Blue: the lens as the images tell it' : 'Blue: the lens as it was used') +
+      (lens.sigma_px.length > 0 ? '; band: one standard deviation' : '') +
+      (lens.given_px.length > 0 ? '. Dashed: the calibration.' : '.') +
+      ' Distortion is how far from the place that a lens without distortion has for the same ray.'),
+    sourceLine('camera.yaml', 'summary.json'));
+  redraws.push(() => drawLens(canvas, lens));
+}
+
 // How far bundle adjustment's largest residual is from the least possible one, in one sentence.
 function finalBracketSentence(final) {
   const kept = `After bundle adjustment the largest residual of the ${whole(final.observations)} observations that it keeps is ` +
@@ -526,7 +595,7 @@ buildNotes();
 const view = buildView();
 buildTransport();
 listeners.push(showPicture, showFacts);
-for (const build of [buildCharts, buildAccuracy, buildKrot, buildSegments, buildGraph, buildLoops, buildTimes, buildFigures,
+for (const build of [buildCharts, buildAccuracy, buildLens, buildKrot, buildSegments, buildGraph, buildLoops, buildTimes, buildFigures,
   buildOptions, buildFiles]) {
   build($('panels'));
 }

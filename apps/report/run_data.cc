@@ -11,8 +11,11 @@
 
 #include "apps/report/run_summary.h"
 #include "output/graph/g2o.h"
+#include "output/tables/lens_curve.h"
 #include "output/trajectory/trajectory.h"
 #include "output/trajectory/trajectory_match.h"
+#include "rotodom/camera/camera_file.h"
+#include "rotodom/camera/read_camera.h"
 #include "rotodom/sequence/sequence.h"
 
 namespace rotslam {
@@ -132,6 +135,115 @@ std::optional<fs::path> TruthBesideImages(const RunData& run) {
       ->GroundTruthFile();
 }
 
+// A camera as summary.json has it; nullopt: none, or not one of ours.
+std::optional<Camera> CameraOf(const nlohmann::ordered_json& json) {
+  if (!json.is_object()) return std::nullopt;
+  const auto number = [&](const char* key) {
+    const auto value = json.find(key);
+    return value != json.end() && value->is_number() ? value->get<double>() : 0.0;
+  };
+  const auto name = json.find("model");
+  const auto model = name != json.end() && name->is_string()
+                         ? FindCameraModel(name->get<std::string>())
+                         : std::nullopt;
+  if (!model) return std::nullopt;
+  Camera camera;
+  camera.model = *model;
+  camera.fx = number("fx");
+  camera.fy = number("fy");
+  camera.cx = number("cx");
+  camera.cy = number("cy");
+  if (const auto list = json.find("distortion"); list != json.end() && list->is_array()) {
+    for (std::size_t k = 0; k < std::min(list->size(), camera.distortion.size()); ++k) {
+      if ((*list)[k].is_number()) camera.distortion[k] = (*list)[k].get<double>();
+    }
+  }
+  return camera;
+}
+
+// The calibration of images of that size: the one that the run was given, else the one that lies
+// with the images.
+std::optional<Camera> GivenCamera(const RunData& run, bool is_estimated, const Camera& size) {
+  if (!is_estimated) return CameraOf(run.summary.at("camera"));
+  const auto sequence = run.summary.at("sequence");
+  if (!sequence.contains("path") || !fs::exists(sequence.at("path").get<std::string>())) {
+    return std::nullopt;
+  }
+  const auto images =
+      OpenSequence(sequence.at("path").get<std::string>(), SequenceOptionsOf(run.summary));
+  if (!images->camera_reference()) return images->own_camera();
+  const CameraReference& reference = *images->camera_reference();
+  return AtSize(ChooseCamera(ReadCameraFile(reference.file), reference, images->image_folder()),
+                size.width,
+                size.height);
+}
+
+// The deviations of the curve's points as the summary has them, for `curve`.
+std::vector<double> CurveSigmas(const nlohmann::ordered_json& summary,
+                                const std::vector<LensCurvePoint>& curve) {
+  const auto path = nlohmann::ordered_json::json_pointer("/ba/lens/sigma_radius_px");
+  if (!summary.contains(path) || !summary.at(path).is_object()) return {};
+  const nlohmann::ordered_json& steps = summary.at(path);
+  std::vector<double> known = {0.0};
+  for (int step = 1; steps.contains(std::to_string(step)); ++step) {
+    const auto& value = steps.at(std::to_string(step));
+    if (!value.is_number()) return {};
+    known.push_back(value.get<double>());
+  }
+  std::vector<double> sigmas;
+  for (const LensCurvePoint& point : curve) {
+    const double place = kLensCurveSteps * point.radius_px / curve.back().radius_px;
+    const auto before = static_cast<std::size_t>(place);
+    if (before >= known.size()) return {};
+    const double next = known[std::min(before + 1, known.size() - 1)];
+    sigmas.push_back(known[before] +
+                     (place - static_cast<double>(before)) * (next - known[before]));
+  }
+  return sigmas;
+}
+
+// Where a lens without distortion shows a ray.
+double UndistortedRadius(const Camera& camera, double angle_rad) {
+  return camera.fx * (camera.model == CameraModel::kEquidistant ? angle_rad : std::tan(angle_rad));
+}
+
+// Whether no calibration was used; one that a pure rotation has refuted was.
+bool IsLensEstimated(const nlohmann::ordered_json& summary) {
+  const auto path = nlohmann::ordered_json::json_pointer("/calibration/source");
+  return summary.contains(path) && (summary.at(path) == "images" || summary.at(path) == "guess");
+}
+
+bool HaveSameLens(const Camera& a, const Camera& b) {
+  return a.model == b.model && a.fx == b.fx && a.fy == b.fy && a.cx == b.cx && a.cy == b.cy &&
+         a.distortion == b.distortion;
+}
+
+LensData LensCurvesOf(const RunData& run, const Camera& camera) {
+  constexpr int kSteps = 8 * kLensCurveSteps;
+  LensData lens;
+  lens.is_estimated = IsLensEstimated(run.summary);
+  const std::vector<LensCurvePoint> curve = LensCurve(camera, CurveCovariance::Zero(), kSteps);
+  for (const LensCurvePoint& point : curve) {
+    lens.radius_px.push_back(point.radius_px);
+    lens.displacement_px.push_back(point.radius_px - UndistortedRadius(camera, point.angle_rad));
+  }
+  if (curve.size() == kSteps) lens.sigma_px = CurveSigmas(run.summary, curve);
+  std::optional<Camera> given;
+  try {
+    given = GivenCamera(run, lens.is_estimated, camera);
+  } catch (const std::exception&) {
+    // A calibration that cannot be read is not drawn.
+    return lens;
+  }
+  if (!given || !(given->fx > 0.0) || HaveSameLens(*given, camera)) return lens;
+  for (const LensCurvePoint& point : curve) {
+    const auto radius_px = LensRadius(*given, point.angle_rad);
+    lens.given_px.push_back(radius_px ? *radius_px - UndistortedRadius(camera, point.angle_rad)
+                                      : std::nan(""));
+  }
+  return lens;
+}
+
 }  // namespace
 
 bool RunData::HasPositions() const {
@@ -163,6 +275,9 @@ RunData ReadRunData(const fs::path& run) {
     data.poses = ReadPoses(run / "trajectory_tum.txt", data.rotations);
   }
   if (is_there("segments.csv")) data.segments = ReadSegmentsCsv(run / "segments.csv");
+  if (is_there("camera.yaml")) {
+    data.lens = LensCurvesOf(data, ReadCamera(run / "camera.yaml"));
+  }
   if (is_there("map.bin")) data.keyframe_map = ReadRunMap(run / "map.bin");
   if (is_there("map_all_frames.bin")) data.cloud = ReadRunMap(run / "map_all_frames.bin");
   return data;

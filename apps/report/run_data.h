@@ -36,6 +36,18 @@ struct TruthData {
   std::vector<double> position_error_m;
 };
 
+/// The lens of a run as a curve over the distance from the principal point: one entry per point.
+struct LensData {
+  bool is_estimated = false;            // no calibration was used
+  std::vector<double> radius_px;        // where the lens shows a ray
+  std::vector<double> displacement_px;  // from where it would show the ray without distortion
+  // One standard deviation of the distance; empty where the run does not know it.
+  std::vector<double> sigma_px;
+  // Where the calibration that was given, or that lies with the images, shows the same rays, from
+  // the same place; NaN where it does not. Empty: there is none, or the run has not changed it.
+  std::vector<double> given_px;
+};
+
 /// Contents of a run's folder; files that are missing leave their fields empty.
 // The check does not recognise that moving a JSON value is noexcept.
 // NOLINTNEXTLINE(bugprone-exception-escape)
@@ -50,8 +62,9 @@ struct RunData {
   std::optional<RunMap> keyframe_map;   // map.bin
   std::optional<RunMap> cloud;          // map_all_frames.bin
   std::optional<TruthData> truth;
-  RunCheck check;             // what in the run to trust
-  std::string truth_problem;  // why the ground truth beside the images could not be used
+  std::optional<LensData> lens;  // camera.yaml, summary.json
+  RunCheck check;                // what in the run to trust
+  std::string truth_problem;     // why the ground truth beside the images could not be used
 
   int NumFrames() const { return static_cast<int>(rotations.size()); }
   /// Whether the camera moved: two frames at least have different positions.

@@ -21,6 +21,7 @@ constexpr Color kFirst = {0.10, 0.36, 0.72, 0.8};
 constexpr Color kSecond = {0.85, 0.41, 0.05, 0.9};
 constexpr Color kThird = {0.05, 0.48, 0.32, 0.9};
 constexpr Color kGrey = {0.45, 0.48, 0.52, 0.6};
+constexpr Color kBand = {0.10, 0.36, 0.72, 0.25};
 constexpr Color kShade = {0.85, 0.41, 0.05, 0.16};
 constexpr double kPageWidth = 504.0;
 constexpr double kMarginLeft = 52.0;
@@ -53,8 +54,18 @@ PlotPoints AtMost(std::size_t limit, const PlotPoints& points) {
   return chosen;
 }
 
-void DrawPanel(const Panel& panel, const std::vector<Series>& all_series, Drawing& drawing) {
+// The outline of an area behind the curves; empty: none.
+struct Band {
+  PlotPoints outline;
+  std::string name;
+};
+
+void DrawPanel(const Panel& panel,
+               std::vector<Series> all_series,
+               Drawing& drawing,
+               const Band& band = {}) {
   Axes axes({kMarginLeft, panel.top, kPanelWidth, panel.height});
+  for (const Eigen::Vector2d& point : band.outline) axes.Include(point);
   for (const Series& series : all_series) {
     for (const Eigen::Vector2d& point : series.points) axes.Include(point);
   }
@@ -66,6 +77,12 @@ void DrawPanel(const Panel& panel, const std::vector<Series>& all_series, Drawin
     const double bottom = panel.top + panel.height;
     drawing.AddArea({{left, panel.top}, {right, panel.top}, {right, bottom}, {left, bottom}},
                     kShade);
+  }
+  if (!band.outline.empty()) {
+    PlotPoints corners;
+    for (const Eigen::Vector2d& point : band.outline) corners.push_back(axes.OnPage(point));
+    drawing.AddArea(std::move(corners), kBand);
+    all_series.push_back({band.name, {}, kBand});
   }
   double legend_x = kMarginLeft;
   for (const Series& series : all_series) {
@@ -410,6 +427,29 @@ Drawing MotionWithinFrame(const RunData& run, double seconds, const std::string&
   return drawing;
 }
 
+// The lens' distortion over the image's radius, with a band of one standard deviation.
+Drawing LensFigure(const LensData& lens) {
+  const Panel panel = {"distance from the principal point, px", "distortion, px"};
+  Drawing drawing(kPageWidth, PageHeight(panel));
+  PlotPoints curve, given, band;
+  for (std::size_t k = 0; k < lens.radius_px.size(); ++k) {
+    curve.emplace_back(lens.radius_px[k], lens.displacement_px[k]);
+    if (!lens.given_px.empty() && std::isfinite(lens.given_px[k])) {
+      given.emplace_back(lens.radius_px[k], lens.given_px[k]);
+    }
+  }
+  for (std::size_t k = 0; k < lens.sigma_px.size(); ++k) {
+    band.emplace_back(curve[k].x(), curve[k].y() + lens.sigma_px[k]);
+  }
+  for (std::size_t k = lens.sigma_px.size(); k-- > 0;) {
+    band.emplace_back(curve[k].x(), curve[k].y() - lens.sigma_px[k]);
+  }
+  std::vector<Series> series = {{lens.is_estimated ? "by the images" : "as used", curve, kFirst}};
+  if (!given.empty()) series.push_back({"calibration", given, kSecond});
+  DrawPanel(panel, series, drawing, {band, "one standard deviation"});
+  return drawing;
+}
+
 // A number of the summary, 0 where it has none.
 double SummaryNumber(const RunData& run, const std::string& group, const std::string& key) {
   if (!run.summary.contains(group) || !run.summary.at(group).is_object()) return 0.0;
@@ -447,6 +487,7 @@ std::vector<Figure> MakeStageFigures(const RunData& run) {
   }
   if (!run.edges.empty()) figures.push_back({"view_graph", ViewGraphFigure(run)});
   if (run.HasPositions()) figures.push_back({"motion", MotionFigure(run)});
+  if (run.lens && !run.lens->radius_px.empty()) figures.push_back({"lens", LensFigure(*run.lens)});
   if (HasGivenOrientations(run)) figures.push_back({"sources", SourcesFigure(run)});
   AddMapFigures(run, figures);
   const double readout_s = SummaryNumber(run, "camera", "readout_s");

@@ -67,19 +67,55 @@ void DescribeFramesWithoutMap(const Orientations& orientations, MapResult& resul
   }
 }
 
+// The orientations through the lens that adjustment has found, as far as frames between keyframes
+// are compared with them.
+Orientations OrientationsThrough(const Camera& camera,
+                                 const Orientations& orientations,
+                                 const SlamOptions& options) {
+  Orientations seen;
+  seen.camera = camera;
+  seen.timestamps_s = orientations.timestamps_s;
+  seen.unconnected = orientations.unconnected;
+  seen.covariance = orientations.covariance;
+  seen.cam_from_world = orientations.cam_from_world;
+  seen.graph = TurnedThroughLens(orientations.graph, orientations.camera, camera);
+  for (const auto& [frame, rotation] : CloseLoops(seen.graph.edges(),
+                                                  orientations.cam_from_world,
+                                                  options.rotodom.averaging,
+                                                  options.num_threads)
+                                           .cam_from_world) {
+    seen.cam_from_world[frame] = rotation;
+  }
+  return seen;
+}
+
+// Whether adjustment has told the lens and all that was measured through another one changes. The
+// lens of a calibration changes by less than orientations err.
+bool SeesAnew(const Orientations& orientations, const SlamOptions& options) {
+  return options.ba.lens.expected && !orientations.given;
+}
+
 // The result of a pure rotation throughout: one segment, every frame at the origin, no points.
 MapResult PureRotationThroughout(const MapResult& moving,
                                  const PureRotationResult& rotation,
                                  const Orientations& orientations,
                                  const SlamOptions& options) {
   MapResult result;
-  result.cam_from_world = FollowAnchors(orientations.graph,
-                                        orientations.cam_from_world,
-                                        rotation.cam_from_world,
-                                        options.rotodom.averaging);
+  if (SeesAnew(orientations, options)) {
+    Orientations seen = OrientationsThrough(rotation.camera, orientations, options);
+    result.through_lens = {std::move(seen.graph), std::move(seen.cam_from_world)};
+  }
+  result.cam_from_world = FollowAnchors(
+      result.through_lens ? result.through_lens->graph : orientations.graph,
+      result.through_lens ? result.through_lens->cam_from_world : orientations.cam_from_world,
+      rotation.cam_from_world,
+      options.rotodom.averaging);
   InterpolateUnknown(orientations, orientations.unconnected, result.cam_from_world);
   result.camera = rotation.camera;
   result.lens_sigmas = StatedSigmas(rotation.lens_sigmas, options.ba.lens, result.camera);
+  if (rotation.lens_covariance) {
+    result.lens_covariance = StatedCovariance(*rotation.lens_covariance, options.ba.lens);
+  }
   result.keyframes = moving.keyframes;
   result.keyframe_tracks = moving.keyframe_tracks;
   result.num_rotation_observations = rotation.num_observations;
@@ -365,6 +401,10 @@ void KeyframeMapBuilder::StateSigmas() {
   if (largest == nullptr) return;
   result_.lens_sigmas =
       StatedSigmas(largest->summary.lens_sigmas, bundle_options_.lens, result_.camera);
+  if (largest->summary.lens_covariance) {
+    result_.lens_covariance =
+        StatedCovariance(*largest->summary.lens_covariance, bundle_options_.lens);
+  }
 }
 
 // Not of a lens that is estimated.
@@ -455,28 +495,6 @@ TrackCompletion KeyframeMapBuilder::CompletionByImages() const {
   };
 }
 
-// The orientations through the lens that adjustment has found, as far as frames between keyframes
-// are compared with them.
-Orientations OrientationsThrough(const Camera& camera,
-                                 const Orientations& orientations,
-                                 const SlamOptions& options) {
-  Orientations seen;
-  seen.camera = camera;
-  seen.timestamps_s = orientations.timestamps_s;
-  seen.unconnected = orientations.unconnected;
-  seen.covariance = orientations.covariance;
-  seen.cam_from_world = orientations.cam_from_world;
-  seen.graph = TurnedThroughLens(orientations.graph, orientations.camera, camera);
-  for (const auto& [frame, rotation] : CloseLoops(seen.graph.edges(),
-                                                  orientations.cam_from_world,
-                                                  options.rotodom.averaging,
-                                                  options.num_threads)
-                                           .cam_from_world) {
-    seen.cam_from_world[frame] = rotation;
-  }
-  return seen;
-}
-
 // Null without images.
 FrameDescription KeyframeMapBuilder::DescriptionByImages(const Camera& camera) const {
   if (images_ == nullptr) return nullptr;
@@ -560,17 +578,25 @@ MapResult BuildMap(const Orientations& orientations,
     return result;
   }
   all_tracks = WithBearingsOf(result.camera, std::move(all_tracks));
-  // The lens of a calibration changes by less than orientations err.
-  if (options.ba.lens.expected && !orientations.given) {
-    const Orientations seen = OrientationsThrough(result.camera, orientations, options);
+  if (SeesAnew(orientations, options)) {
+    Orientations seen = OrientationsThrough(result.camera, orientations, options);
     result.cam_from_world = FollowAnchors(
         seen.graph, seen.cam_from_world, result.map.cam_from_world, options.rotodom.averaging);
     RegisterRemainingFrames(seen, all_tracks, options, observer, result);
+    result.keyframe_tracks = WithBearingsOf(result.camera, std::move(result.keyframe_tracks));
+    result.through_lens = {std::move(seen.graph), std::move(seen.cam_from_world)};
   } else {
     RegisterRemainingFrames(orientations, all_tracks, options, observer, result);
   }
   MakeCloud(all_tracks, options, observer, result);
   return result;
+}
+
+void TakeThroughLens(const MapResult& map, Orientations& orientations) {
+  if (!map.through_lens) return;
+  orientations.graph = map.through_lens->graph;
+  orientations.cam_from_world = map.through_lens->cam_from_world;
+  orientations.camera = map.camera;
 }
 
 }  // namespace rotslam

@@ -23,6 +23,10 @@ MapResult BuildMap(const Orientations& orientations,
                    ImageProvider* images,
                    SlamObserver& observer);
 
+/// Gives the relative and absolute orientations that belong to the map's camera, where the map has
+/// them (MapResult::through_lens), and that camera.
+void TakeThroughLens(const MapResult& map, Orientations& orientations);
+
 /// Runs BuildMap up to bundle adjustment and without images, for callers that need only the lens or
 /// the keyframes. The result has no cloud and no positions of the frames between keyframes.
 MapResult BuildKeyframeMap(const Orientations& orientations,

@@ -160,11 +160,12 @@ void FreeLens(const Camera& expected, LensOptions& lens) {
   lens.refine_higher_terms = true;
   // Half of it: EstimateLens starts within a tenth.
   lens.focal_sigma = 0.5;
-  // Observations err alike, so that these three are tighter than lenses differ. Looser ones let the
-  // principal point and the tangential coefficients trade with each other along a drive.
-  lens.principal_sigma = 0.01;
+  // Lenses differ by so much. Only the tangential coefficients are held nearly at zero: along a
+  // drive the principal point trades with them.
+  lens.principal_sigma = 0.03;
   lens.distortion_sigma = 0.1;
   lens.tangential_share = 0.005;
+  lens.weighs_by_residuals = true;
   lens.expected = expected;
   lens.min_gain = 0.0;
 }

@@ -15,8 +15,15 @@
 #include "rotodom/types/maps.h"
 #include "rotodom/types/pure_rotation_segment.h"
 #include "rotodom/types/reconstruction.h"
+#include "rotodom/types/view_graph.h"
 
 namespace rotslam {
+
+/// What the first stage has measured, as it is through another lens.
+struct LensOrientations {
+  ViewGraph graph;             // relative rotations
+  RotationMap cam_from_world;  // averaged over them
+};
 
 /// Positions and points, and how they were found.
 struct MapResult {
@@ -27,7 +34,13 @@ struct MapResult {
   Reconstruction cloud;    // every frame, and the points of all tracks with enough parallax
   Camera camera;           // as the map's largest component has refined it
   LensSigmas lens_sigmas;  // of `camera`, see StatedSigmas
+  // The same with what the errors of the parameters have in common, relative to `camera`; nullopt
+  // where the map has not refined the lens.
+  std::optional<LensCovariance> lens_covariance;
   CalibrationCheck calibration_check;  // of the largest component
+  // Set where the lens was estimated and the map has refined it: the first stage's orientations
+  // through `camera`, see TakeThroughLens.
+  std::optional<LensOrientations> through_lens;
   std::set<FrameId> keyframes;
   std::vector<Track> keyframe_tracks;  // input of the known-rotation problem
   std::vector<PureRotationSegment> segments;

@@ -83,6 +83,7 @@ SlamResult RunSlam(FrameSource& original_frames,
   result.orientations = FindOrientations(frames, found, options, known, observer);
   if (!result.orientations.interrupted) {
     result.map = BuildMap(result.orientations, options, &frames, observer);
+    TakeThroughLens(result.map, result.orientations);
     ToOriginalSize(reduced, result.map);
   }
   ToOriginalSize(reduced, result.orientations);

@@ -74,9 +74,10 @@ std::optional<CameraCovariances> FindCovariances(const Camera& calibrated,
   }
   const std::size_t num_poses = groups.size();
   const int num_lens_blocks = refine_lens ? options.lens.NumBlocks() : 0;
+  if (num_lens_blocks > 0) groups.emplace_back();
   for (int k = 0; k < num_lens_blocks; ++k) {
     moving.push_back(cameras.Lens() + k * kLensBlockSize);
-    groups.push_back({moving.back()});
+    groups.back().push_back(moving.back());
   }
   const auto found = MarginalCovariances(problem, points, moving, groups);
   if (!found) return std::nullopt;
@@ -86,10 +87,10 @@ std::optional<CameraCovariances> FindCovariances(const Camera& calibrated,
     if (!adjustment.IsUsed(k)) continue;
     covariances.poses[k] = OfPose((*found)[k], adjustment.Moves(cameras.Turn(k)));
   }
-  if (num_lens_blocks > 0) covariances.lens_variances = LensParameters::Zero();
-  for (int k = 0; k < num_lens_blocks; ++k) {
-    covariances.lens_variances->segment<kLensBlockSize>(k * kLensBlockSize) =
-        (*found)[num_poses + k].diagonal();
+  if (num_lens_blocks > 0) {
+    const int size = num_lens_blocks * kLensBlockSize;
+    covariances.lens = LensCovariance::Zero();
+    covariances.lens->topLeftCorner(size, size) = found->back();
   }
   return covariances;
 }

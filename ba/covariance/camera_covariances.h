@@ -16,7 +16,7 @@ namespace rotslam {
 /// How well a minimum is known where nothing outside the state is: see BundleResult.
 struct CameraCovariances {
   std::vector<std::optional<PoseCovariance>> poses;  // by frame of the state; nullopt: not in it
-  std::optional<LensParameters> lens_variances;      // zero for blocks that are held
+  std::optional<LensCovariance> lens;                // zero for blocks that are held
 };
 
 /// Covariances of the cameras at the minimum that `state` is; the arguments are Minimise's.

@@ -128,7 +128,7 @@ void AdjustmentProblem::AddRotationPriors() {
 // elimination.
 void AdjustmentProblem::FreeLens(const LensOptions& options) {
   LensParameters sigmas = options.Sigmas(calibrated_.model);
-  for (double& sigma : sigmas) sigma = std::max(sigma, kHeldSigma);
+  for (double& sigma : sigmas) sigma = std::max(sigma / state_.lens_noise, kHeldSigma);
   const LensParameters expected = LensOf(options.expected.value_or(calibrated_), calibrated_);
   for (int k = 0; k < num_lens_blocks_; ++k) {
     const int first = k * kLensBlockSize;

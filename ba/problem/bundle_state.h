@@ -53,6 +53,9 @@ struct BundleState {
   std::vector<TrackState> tracks;
   // Whether keypoints are less certain along their blurs.
   bool has_motion_blur = false;
+  // Of what many observations tell of the lens, in their sigmas: what priors of the lens are
+  // weighed by (LensOptions::weighs_by_residuals).
+  double lens_noise = 1.0;
   // Where tracks are that are not the problem's any more.
   std::shared_ptr<const std::vector<Track>> replaced;
 };

@@ -50,6 +50,10 @@ struct BundleRound {
   }
 };
 
+/// Errors of a lens that many observations tell, over those that they would have if their errors
+/// were independent: neighbouring observations err alike. On simulated walks and drives 2 to 5.
+inline constexpr double kCommonErrors = 4.0;
+
 /// How far the calibration is believed. It is a measurement too: what a calibration has left of a
 /// lens' distortion bends every track alike, and a long drive turns that into a drift of scale that
 /// no number of observations averages out.
@@ -75,6 +79,11 @@ struct LensOptions {
   double tangential_share = 0.1;
   // What the parameters are expected to be; none: those of the camera that adjustment starts from.
   std::optional<Camera> expected;
+  // The deviations above are those of lenses as they are: they are weighed by how large the
+  // residuals turn out, and errors that neighbouring observations have in common count in
+  // (kCommonErrors). The result's deviations count them in, too. Off: they count as one observation
+  // of sigma_px each.
+  bool weighs_by_residuals = false;
   // Standard deviations of the parameters of this very camera, in place of those above and of what
   // they free; 0: held.
   std::optional<LensParameters> given_sigmas;

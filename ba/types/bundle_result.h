@@ -16,6 +16,9 @@ namespace rotslam {
 /// Of (delta, centre): delta in rad as in Exp(delta) * cam_from_world, centre in world units.
 using PoseCovariance = Eigen::Matrix<double, 6, 6>;
 
+/// Of LensParameters.
+using LensCovariance = Eigen::Matrix<double, kLensSize, kLensSize>;
+
 /// How bundle adjustment ended.
 enum class BundleStatus {
   kNotRun,
@@ -81,8 +84,11 @@ struct BundleSummary {
   double lens_gain = 0.0;     // share of the cost that another lens took off, see LensOptions
   bool lens_refined = false;  // whether that was enough
   // Of a refined lens, where asked for: the calibration's own counted in. As pose_covariance, they
-  // count every observation's error as independent.
+  // count every observation's error as independent, but for LensOptions::weighs_by_residuals.
   std::optional<LensSigmas> lens_sigmas;
+  // The same with what their errors have in common; relative to the camera given. Parameters that
+  // were held have next to none.
+  std::optional<LensCovariance> lens_covariance;
   double seconds = 0.0;
   std::vector<BundleRoundSummary> rounds;
 };

@@ -554,6 +554,37 @@ TEST(RefineBundle, RefinesAPrincipalPointWhenAsked) {
   EXPECT_EQ(result.camera.model, CameraModel::kPinhole);
 }
 
+// Keypoints that are ten times as good as their sigma says, and a principal point that is six
+// deviations of its prior from where most are.
+TEST(RefineBundle, WeighsWhatIsExpectedOfALensByTheResiduals) {
+  Camera lens = BaCamera();
+  lens.cx += 0.06 * lens.fx;
+  BaScene scene =
+      MakeBaScene({.num_frames = 40, .num_points = 400, .noise_px = 0.1, .camera = lens});
+  scene.camera = lens;
+  BundleOptions options;
+  options.find_lens_covariance = true;
+  options.lens.refine_principal_point = true;
+  options.lens.refine_distortion = false;
+  options.lens.principal_sigma = 0.01;
+  options.lens.min_gain = 0.0;
+  options.lens.expected = BaCamera();
+  options.coarse.function_tolerance = 1e-8;
+  const BundleProblem problem = PerturbedProblem(scene, 0.1, 0.5);
+  const BundleResult plain = RefineBundle(problem, options);
+  options.lens.weighs_by_residuals = true;
+  const BundleResult weighed = RefineBundle(problem, options);
+  ASSERT_TRUE(plain.Usable() && weighed.Usable());
+  EXPECT_LT(std::abs(weighed.camera.cx - lens.cx), 0.5 * std::abs(plain.camera.cx - lens.cx));
+  ASSERT_TRUE(plain.summary.lens_sigmas && weighed.summary.lens_sigmas);
+  EXPECT_LT(weighed.summary.lens_sigmas->cx_px, 0.8 * plain.summary.lens_sigmas->cx_px);
+  EXPECT_LT(std::abs(weighed.camera.cx - lens.cx), 2.5 * weighed.summary.lens_sigmas->cx_px);
+  ASSERT_TRUE(weighed.summary.lens_covariance);
+  EXPECT_NEAR(std::sqrt((*weighed.summary.lens_covariance)(kLensCenter, kLensCenter)) * lens.fx,
+              weighed.summary.lens_sigmas->cx_px,
+              1e-9);
+}
+
 TEST(RefineBundle, LeavesAGoodCalibrationToTheLastBit) {
   for (const std::uint32_t seed : {1U, 2U, 3U}) {
     const BaScene scene = MakeBaScene({.noise_px = 0.5, .seed = seed});

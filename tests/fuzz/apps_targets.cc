@@ -50,6 +50,8 @@ const RegisterFuzzTarget batch_record("batch_record",
 
 const RegisterFuzzTarget exif("exif", [](std::string_view bytes, const TemporaryFolder& folder) {
   FilmFocalLength(folder.Write("image.jpg", std::string(bytes)));
+  FilmFocalLength(
+      std::map<std::string, std::string>{{"focal_length.35mm_equivalent", std::string(bytes)}});
 });
 
 const RegisterFuzzTarget kitti_poses("kitti_poses",

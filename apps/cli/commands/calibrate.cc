@@ -154,14 +154,14 @@ int CalibrateWithoutBoard(const CalibrateFlags& flags) {
   RunOptions options;
   options.seed = flags.common.seed;
   options.num_threads = flags.common.NumThreads();
-  const FocalGuess guess = GuessFocal(flags.images, sequence_options, size);
+  const FocalGuess guess = GuessFocal(flags.images, sequence_options, original.sequence());
   const WorkingSize working(size, options.max_image_side_px);
   ReducedFrames frames(original, working);
   const Interruption interruption;
   SlamProgress observer(options, working, interruption, progress);
   const LensEstimate estimate =
       EstimateLens(frames,
-                   {working.Reduced(UncalibratedCamera(size, guess.focal_px)), guess.is_from_exif},
+                   {working.Reduced(UncalibratedCamera(size, guess.focal_px)), guess.KnowsFocal()},
                    options,
                    observer);
   if (estimate.interrupted) return Interruption::kExitCode;

@@ -7,6 +7,7 @@
 #include "apps/cli/commands/track_input.h"
 #include "apps/cli/input/option_texts.h"
 #include "apps/cli/run_directory/map_files.h"
+#include "apps/cli/run_directory/orientation_files.h"
 #include "apps/cli/run_directory/position_files.h"
 #include "apps/cli/run_directory/run_directory.h"
 #include "apps/cli/run_directory/run_report.h"
@@ -107,7 +108,7 @@ void Warn(const TrackedInput& tracked,
 
 int FinishRun(TrackedInput& tracked, const RunOutputFlags& flags) {
   const Input& input = tracked.input;
-  const Orientations& orientations = tracked.orientations;
+  Orientations& orientations = tracked.orientations;
   const std::filesystem::path& folder = tracked.outputs.folder();
   Progress& progress = tracked.progress;
   if (input.guess) {
@@ -129,11 +130,16 @@ int FinishRun(TrackedInput& tracked, const RunOutputFlags& flags) {
     const EndAtInterruption end_at_interruption(tracked.interruption, end_early);
     return BuildMap(orientations, tracked.options, &tracked.frames, tracked.observer);
   }();
+  if (positions.through_lens) {
+    TakeThroughLens(positions, orientations);
+    WriteOrientations(folder, orientations, tracked.options.rotodom.averaging);
+  }
   tracked.ToOriginalSize(positions);
   tracked.ToOriginalSize();
   const double positions_s = SecondsSince(tracked.start) - orientations_s - tracked.lens_s;
   WritePositions(folder, orientations, positions, flags.ascii ? PlyForm::kAscii : PlyForm::kBinary);
-  WriteKnownRotationInput(folder, orientations, positions, input.camera);
+  WriteKnownRotationInput(
+      folder, orientations, positions, positions.through_lens ? positions.camera : input.camera);
   FeatureOptions features = tracked.options.rotodom.features;
   features.num_levels += tracked.working.NumLevelsBelow(features.scale_factor);
   WriteCameraYaml(folder / "camera.yaml", positions.camera, positions.lens_sigmas);

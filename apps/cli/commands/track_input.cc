@@ -52,7 +52,7 @@ double FindLensOf(TrackedInput& tracked, bool refines) {
   });
   const LensEstimate estimate =
       EstimateLens(tracked.frames,
-                   {tracked.working.Reduced(input.camera), input.guess->is_from_exif},
+                   {tracked.working.Reduced(input.camera), input.guess->KnowsFocal()},
                    tracked.options,
                    observer,
                    MaskInputs(tracked),

@@ -63,7 +63,7 @@ std::vector<std::string> DescribeCamera(const Input& input) {
   if (input.guess) {
     return {"camera: no calibration: the lens is estimated from the images, starting from f = " +
             Number("%.1f px", input.guess->focal_px) +
-            (input.guess->is_from_exif ? " (EXIF data)" : "")};
+            (input.guess->KnowsFocal() ? " (" + Name(input.guess->source) + ")" : std::string())};
   }
   std::vector<std::string> lines = {"camera: " + Describe(input.camera) + " (" +
                                     input.camera_source + ")"};

@@ -1,8 +1,10 @@
 #include "apps/cli/input/lens_guess.h"
 
 #include <array>
+#include <cctype>
 #include <cmath>
 #include <cstdio>
+#include <cstdlib>
 #include <memory>
 
 #include <libexif/exif-data.h>
@@ -16,6 +18,27 @@ namespace {
 
 // Diagonal of a frame of 35 mm film, mm: CIPA DCG-001 defines the equivalent by it.
 const double kFilmDiagonal = std::hypot(36.0, 24.0);
+
+// Focal lengths of lenses that exist, as if for film; anything else is a mistake.
+constexpr double kLeastFilm_mm = 5.0;
+constexpr double kMostFilm_mm = 2000.0;
+
+// Letters and digits, in lower case.
+std::string LettersOf(const std::string& key) {
+  std::string letters;
+  for (const char c : key) {
+    const auto byte = static_cast<unsigned char>(c);
+    if (std::isalnum(byte) != 0) letters += static_cast<char>(std::tolower(byte));
+  }
+  return letters;
+}
+
+// `26`, `26.5 mm`, `53/2`; not finite, or 0, where there is no number.
+double NumberAtStart(const std::string& text) {
+  char* end = nullptr;
+  const double number = std::strtod(text.c_str(), &end);
+  return *end == '/' ? number / std::strtod(end + 1, nullptr) : number;
+}
 
 std::string Pixels(double focal_px) {
   std::array<char, 32> text = {};
@@ -39,14 +62,43 @@ std::optional<double> FilmFocalLength(const std::filesystem::path& image) {
   return focal_mm > 0 ? std::optional<double>(focal_mm) : std::nullopt;
 }
 
-FocalGuess GuessFocal(const std::filesystem::path& sequence,
+std::optional<double> FilmFocalLength(const std::map<std::string, std::string>& tags) {
+  for (const auto& [key, value] : tags) {
+    const std::string letters = LettersOf(key);
+    // EXIF's own name of it is FocalLengthIn35mmFilm, in short FocalLenIn35mmFilm.
+    if (letters.find("focallen") == std::string::npos ||
+        letters.find("35mm") == std::string::npos) {
+      continue;
+    }
+    const double focal_mm = NumberAtStart(value);
+    if (focal_mm >= kLeastFilm_mm && focal_mm <= kMostFilm_mm) return focal_mm;
+  }
+  return std::nullopt;
+}
+
+std::string Name(FocalSource source) {
+  switch (source) {
+    case FocalSource::kExif:
+      return "EXIF data";
+    case FocalSource::kVideoMetadata:
+      return "the video's metadata";
+    case FocalSource::kImageSize:
+      break;
+  }
+  return {};
+}
+
+FocalGuess GuessFocal(const std::filesystem::path& path,
                       const SequenceOptions& options,
-                      const cv::Size& image_size) {
+                      const Sequence& sequence) {
   FocalGuess guess;
-  const Layout layout = FindLayout(sequence, options);
-  const auto film_mm =
-      layout.entries.empty() ? std::nullopt : FilmFocalLength(layout.entries.front().file);
-  guess.is_from_exif = film_mm.has_value();
+  const cv::Size image_size = sequence.image_size();
+  const Layout layout = FindLayout(path, options);
+  const auto film_mm = layout.entries.empty() ? FilmFocalLength(sequence.metadata())
+                                              : FilmFocalLength(layout.entries.front().file);
+  if (film_mm) {
+    guess.source = layout.entries.empty() ? FocalSource::kVideoMetadata : FocalSource::kExif;
+  }
   guess.focal_px = film_mm
                        ? *film_mm / kFilmDiagonal * std::hypot(image_size.width, image_size.height)
                        : GuessFocalLength(image_size);
@@ -59,15 +111,20 @@ std::string WarningOf(const FocalGuess& guess, const Camera& refined) {
            "; camera.yaml has it. Sizes of angles may be off by some tenths of a percent";
   }
   return std::string("no calibration, and the images do not tell the lens: the focal length is ") +
-         (guess.is_from_exif ? "from EXIF data, " : "a guess, 1.2 x the longer side, ") +
+         (guess.KnowsFocal() ? "from " + Name(guess.source) + ", "
+                             : "a guess, 1.2 x the longer side, ") +
          Pixels(refined.fx) +
          ". Angles and shapes are off as far as that is. Turn and move the camera more, or give a "
          "calibration (rotslam calibrate)";
 }
 
 SummaryTable SummaryOf(const FocalGuess& guess, const Camera& refined) {
+  const auto start = [&]() -> std::string {
+    if (guess.source == FocalSource::kExif) return "exif";
+    return guess.KnowsFocal() ? "video metadata" : "image size";
+  };
   return {{"source", guess.is_found ? "images" : "guess"},
-          {"start", guess.is_from_exif ? "exif" : "image size"},
+          {"start", start()},
           {"start_px", guess.focal_px},
           {"refined_px", refined.MeanFocal()}};
 }

@@ -132,9 +132,8 @@ Input OpenInput(const InputFlags& flags,
   for (const std::string& line : DescribeSequence(input.sequence())) tell(line);
   RefuseSphericalPictures(*input.frames);
   if (!ReadCalibration(flags, input)) {
-    const cv::Size size = input.sequence().image_size();
-    input.guess = GuessFocal(flags.sequence, options, size);
-    input.camera = UncalibratedCamera(size, input.guess->focal_px);
+    input.guess = GuessFocal(flags.sequence, options, input.sequence());
+    input.camera = UncalibratedCamera(input.sequence().image_size(), input.guess->focal_px);
   }
   ReadMasks(flags, input);
   if (!flags.rotations.empty()) {

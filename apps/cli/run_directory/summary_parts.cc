@@ -10,6 +10,7 @@
 
 #include "apps/cli/input/lens_guess.h"
 #include "apps/cli/run_directory/map_segments.h"
+#include "output/tables/lens_curve.h"
 #include "output/tables/poses_csv.h"
 
 namespace rotslam {
@@ -112,10 +113,9 @@ SummaryTable SecondsOf(const Orientations& orientations) {
 }
 
 // The lens as bundle adjustment has refined it, and how certain it is.
-void AddLens(const BundleSummary& bundle,
-             const Camera& camera,
-             const LensSigmas& sigmas,
-             SummaryTable& table) {
+void AddLens(const BundleSummary& bundle, const MapResult& positions, SummaryTable& table) {
+  const Camera& camera = positions.camera;
+  const LensSigmas& sigmas = positions.lens_sigmas;
   table.insert(table.end(),
                {{"lens.gain", bundle.lens_gain},
                 {"lens.refined", bundle.lens_refined},
@@ -134,6 +134,12 @@ void AddLens(const BundleSummary& bundle,
                 {"lens.sigma_cy_px", sigmas.cy_px}});
   for (std::size_t k = 0; k < std::min(names.size(), sigmas.distortion.size()); ++k) {
     table.emplace_back(std::string("lens.sigma_") + names[k], sigmas.distortion[k]);
+  }
+  if (!positions.lens_covariance) return;
+  int step = 0;
+  for (const LensCurvePoint& point :
+       LensCurve(camera, *positions.lens_covariance, kLensCurveSteps)) {
+    table.emplace_back("lens.sigma_radius_px." + std::to_string(++step), point.sigma_px);
   }
 }
 
@@ -339,7 +345,7 @@ void AddBundles(const MapResult& positions, RunSummary& summary) {
                             {"median_error_px", largest.after.median_px},
                             {"p90_error_px", largest.after.p90_px},
                             {"has_motion_blur", largest.has_motion_blur}};
-  AddLens(largest, positions.camera, positions.lens_sigmas, *summary.ba);
+  AddLens(largest, positions, *summary.ba);
   AddStages(bundles, *summary.ba, summary.seconds);
 }
 

@@ -19,6 +19,9 @@ LensSigmas StatedSigmas(const std::optional<LensSigmas>& refined,
                         const LensOptions& priors,
                         const Camera& camera);
 
+/// The same for adjustment's own covariance of the parameters.
+LensCovariance StatedCovariance(const LensCovariance& refined, const LensOptions& priors);
+
 /// Lets adjustment move the parameters of a calibration as far as the deviations let it that came
 /// with it.
 /// @param stated  of `camera`, as StatedSigmas gives them; zero: held.

@@ -124,6 +124,7 @@ std::set<FrameId> RefineRelocalised(const std::vector<RelocalisedMap>& maps,
       bundle.summary.lens_gain = before.lens_gain;
       bundle.summary.lens_refined = before.lens_refined;
       bundle.summary.lens_sigmas = before.lens_sigmas;
+      bundle.summary.lens_covariance = before.lens_covariance;
     }
     // Components are ordered by their first keyframe.
     const int first = *parts.begin();

@@ -18,8 +18,10 @@
 #include "apps/report/page_data.h"
 #include "apps/report/run_data.h"
 #include "output/graph/g2o.h"
+#include "output/tables/lens_curve.h"
 #include "output/tables/summary.h"
 #include "output/trajectory/trajectory.h"
+#include "rotodom/camera/read_camera.h"
 #include "tests/output/temporary_folder.h"
 
 namespace rotslam {
@@ -441,6 +443,53 @@ TEST_F(Report, FiguresOfStagesFollowTheSummary) {
               testing::AllOf(HasSubstr(">loop</text>"), HasSubstr("refused</text>")));
   // 0.03 rad a frame, 300 px, 0.1 s between frames, open for a tenth of that: 0.9 px.
   EXPECT_THAT(SvgOf(figures, "motion_blur"), testing::ContainsRegex(">0\\.(8999|9000)"));
+}
+
+// A run that has refined the small camera's lens.
+void WriteLens(const fs::path& run) {
+  Camera camera = SmallCamera();
+  camera.model = CameraModel::kRadtan;
+  camera.distortion[0] = 0.1;
+  WriteCameraYaml(run / "camera.yaml", camera);
+  std::ifstream in(run / "summary.json");
+  Json summary = Json::parse(in);
+  Json& sigmas = summary["ba"]["lens"]["sigma_radius_px"];
+  for (int step = 1; step <= kLensCurveSteps; ++step) sigmas[std::to_string(step)] = 0.25 * step;
+  std::ofstream(run / "summary.json") << summary.dump();
+}
+
+TEST_F(Report, DrawsTheLensBesideItsCalibration) {
+  EXPECT_FALSE(ReadRunData(Run()).lens);
+  WriteLens(Run());
+  const RunData run = ReadRunData(Run());
+  ASSERT_TRUE(run.lens);
+  const LensData& lens = *run.lens;
+  EXPECT_FALSE(lens.is_estimated);
+  ASSERT_EQ(lens.radius_px.size(), lens.displacement_px.size());
+  EXPECT_DOUBLE_EQ(lens.radius_px.back(), 200.0) << "half of the diagonal";
+  // f k1 tan^3 for the ray that is shown there.
+  const double tangent = (lens.radius_px.back() - lens.displacement_px.back()) / 300.0;
+  EXPECT_NEAR(lens.displacement_px.back(), 300.0 * 0.1 * std::pow(tangent, 3), 1e-6);
+  ASSERT_EQ(lens.sigma_px.size(), lens.radius_px.size());
+  EXPECT_NEAR(lens.sigma_px.back(), 2.0, 1e-9);
+  EXPECT_NEAR(lens.sigma_px[lens.sigma_px.size() / 2 - 1], 1.0, 1e-9);
+  ASSERT_EQ(lens.given_px.size(), lens.radius_px.size());
+  for (const double displacement : lens.given_px) EXPECT_NEAR(displacement, 0.0, 1e-9);
+  EXPECT_THAT(SvgOf(MakeFigures(run), "lens"),
+              testing::AllOf(HasSubstr(">calibration</text>"),
+                             HasSubstr(">one standard deviation</text>"),
+                             testing::Not(HasSubstr("nan"))));
+  EXPECT_EQ(Data().at("lens").at("sigma_px").size(), lens.sigma_px.size());
+}
+
+TEST_F(Report, DrawsALensThatNothingIsKnownOfAlone) {
+  WriteCameraYaml(Run() / "camera.yaml", SmallCamera());
+  const RunData run = ReadRunData(Run());
+  ASSERT_TRUE(run.lens);
+  EXPECT_TRUE(run.lens->sigma_px.empty());
+  EXPECT_TRUE(run.lens->given_px.empty()) << "it is the calibration";
+  EXPECT_THAT(SvgOf(MakeFigures(run), "lens"),
+              testing::Not(HasSubstr(">one standard deviation</text>")));
 }
 
 }  // namespace

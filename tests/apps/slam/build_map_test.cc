@@ -12,6 +12,8 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include "apps/slam/lens_estimation.h"
+#include "rotodom/self_calibration/through_lens.h"
 #include "tests/scenes/alignment.h"
 #include "tests/scenes/scene.h"
 
@@ -153,6 +155,59 @@ TEST(BuildMap, PlacesTheOtherFramesAndMakesACloud) {
   using enum SlamStage;
   EXPECT_THAT(observer.ended,
               ElementsAre(kTracks, kKnownRotation, kBundleAdjustment, kFrameRegistration, kCloud));
+}
+
+// What the first stage would have said through another lens.
+Orientations SeenThrough(const Camera& camera, Orientations orientations) {
+  orientations.graph = TurnedThroughLens(orientations.graph, orientations.camera, camera);
+  for (auto& [frame, features] : orientations.features) {
+    for (int k = 0; k < features.size(); ++k) {
+      features.bearings[k] = *camera.Unproject(features.keypoints_px[k]);
+    }
+  }
+  for (auto& [frame, rotation] : orientations.cam_from_world) {
+    if (frame.value == 0) continue;
+    const FrameId before{frame.value - 1};
+    rotation = orientations.graph.FindEdge(before, frame)->j_from_i *
+               orientations.cam_from_world.at(before);
+  }
+  orientations.camera = camera;
+  return orientations;
+}
+
+TEST(BuildMap, GivesOrientationsThroughTheLensThatItFinds) {
+  const Scene scene = Street();
+  Camera start = scene.camera;
+  start.fx *= 1.08;
+  start.fy *= 1.08;
+  Orientations orientations = SeenThrough(start, OrientationsOf(scene, false));
+  const auto error_deg = [&](const RotationMap& cam_from_world) {
+    double largest = 0.0;
+    for (const auto& [frame, rotation] : scene.true_cam_from_world) {
+      const Rotation from_first =
+          cam_from_world.at(frame) * cam_from_world.at(FrameId{0}).Inverse();
+      const Rotation truth = rotation * scene.true_cam_from_world.at(FrameId{0}).Inverse();
+      largest = std::max(largest, (from_first * truth.Inverse()).AngleDeg());
+    }
+    return largest;
+  };
+  const double before_deg = error_deg(orientations.cam_from_world);
+  StageObserver observer;
+  SlamOptions options;
+  EXPECT_FALSE(BuildMap(orientations, options, nullptr, observer).through_lens)
+      << "a calibration stands";
+  FreeLens(PlainLens(start), options.ba.lens);
+  const MapResult map = BuildMap(orientations, options, nullptr, observer);
+  ASSERT_TRUE(map.through_lens);
+  EXPECT_NEAR(map.camera.fx / scene.camera.fx, 1.0, 0.02);
+  EXPECT_TRUE(map.lens_covariance);
+  TakeThroughLens(map, orientations);
+  EXPECT_EQ(orientations.camera, map.camera);
+  EXPECT_EQ(orientations.graph.edges().size(), map.through_lens->graph.edges().size());
+  EXPECT_LT(error_deg(orientations.cam_from_world), 0.5 * before_deg);
+  // What is written for `solve` belongs to that lens, too.
+  const Observation& one = map.keyframe_tracks.front().observations.front();
+  EXPECT_LT((one.bearing - *map.camera.Unproject(one.keypoint_px)).norm(), 1e-12);
 }
 
 Scene Pivot() {

@@ -141,7 +141,9 @@ bool HasEncoder(const std::string& codec) {
   return avcodec_find_encoder_by_name(codec.c_str()) != nullptr;
 }
 
-void WriteTestVideo(const std::filesystem::path& file, const std::vector<TestStream>& streams) {
+void WriteTestVideo(const std::filesystem::path& file,
+                    const std::vector<TestStream>& streams,
+                    const std::map<std::string, std::string>& tags) {
   av_log_set_level(AV_LOG_QUIET);
   AVFormatContext* container = nullptr;
   const char* format = file.extension() == ".m4v" ? "m4v" : nullptr;  // else an MP4 file
@@ -152,7 +154,13 @@ void WriteTestVideo(const std::filesystem::path& file, const std::vector<TestStr
     encoders.push_back(std::make_unique<Encoder>(stream, container));
   }
   Check(avio_open(&container->pb, file.c_str(), AVIO_FLAG_WRITE), "avio_open");
-  Check(avformat_write_header(container, nullptr), "avformat_write_header");
+  AVDictionary* muxer_options = nullptr;
+  if (!tags.empty()) av_dict_set(&muxer_options, "movflags", "use_metadata_tags", 0);
+  for (const auto& [key, value] : tags) {
+    av_dict_set(&container->metadata, key.c_str(), value.c_str(), 0);
+  }
+  Check(avformat_write_header(container, &muxer_options), "avformat_write_header");
+  av_dict_free(&muxer_options);
   for (const auto& encoder : encoders) encoder->Write(container);
   Check(av_write_trailer(container), "av_write_trailer");
   avio_closep(&container->pb);

@@ -2,6 +2,7 @@
 
 #include <cstdint>
 #include <filesystem>
+#include <map>
 #include <string>
 #include <vector>
 
@@ -25,7 +26,10 @@ struct TestStream {
 bool HasEncoder(const std::string& codec);
 
 /// Writes a file with these streams; its name says the container.
-void WriteTestVideo(const std::filesystem::path& file, const std::vector<TestStream>& streams);
+/// @param tags  of the file: MP4 and QuickTime files hold any keys.
+void WriteTestVideo(const std::filesystem::path& file,
+                    const std::vector<TestStream>& streams,
+                    const std::map<std::string, std::string>& tags = {});
 
 /// Frame k is of a grey of 20 k + 10.
 std::vector<cv::Mat> GreyPictures(int count, const cv::Size& size = {64, 48});

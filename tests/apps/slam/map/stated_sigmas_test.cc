@@ -32,13 +32,27 @@ TEST(StatedSigmas, OfALensThatNobodyKnowsAreWide) {
   EXPECT_DOUBLE_EQ(stated.focal_px, 250.0) << "half of a focal length, not more than all of it";
 }
 
-TEST(TakeStatedSigmas, GivesBackWhatAdjustmentSaid) {
+TEST(StatedSigmas, AreAdjustmentsOwnWhereResidualsCountedIn) {
   const LensSigmas refined = {0.5, 0.25, 0.125, {1e-4, 2e-4, 1e-5, 2e-5, 4e-4}};
+  LensOptions priors;
+  LensCovariance covariance = LensCovariance::Identity();
+  EXPECT_GT(StatedSigmas(refined, priors, kCamera).focal_px, 2.0 * refined.focal_px);
+  EXPECT_GT(StatedCovariance(covariance, priors)(0, 0), 4.0);
+  FreeLens(kCamera, priors);
+  EXPECT_DOUBLE_EQ(StatedSigmas(refined, priors, kCamera).focal_px, refined.focal_px);
+  EXPECT_EQ(StatedCovariance(covariance, priors), covariance);
+}
+
+TEST(TakeStatedSigmas, BelievesThem) {
+  const LensSigmas stated = {0.5, 0.25, 0.125, {1e-4, 2e-4, 1e-5, 2e-5, 4e-4}};
   LensOptions lens;
-  TakeStatedSigmas(StatedSigmas(refined, {}, kCamera), kCamera, lens);
+  TakeStatedSigmas(stated, kCamera, lens);
   EXPECT_FALSE(lens.Problem());
-  EXPECT_TRUE(lens.Sigmas(kCamera.model).isApprox(RelativeSigmas(refined, kCamera)));
+  EXPECT_TRUE(lens.weighs_by_residuals);
+  EXPECT_TRUE(lens.Sigmas(kCamera.model).isApprox(RelativeSigmas(stated, kCamera)));
   EXPECT_EQ(lens.NumBlocks(), 2);
+  // Known as well as before where no adjustment has asked the images.
+  EXPECT_NEAR(StatedSigmas(std::nullopt, lens, kCamera).focal_px, stated.focal_px, 1e-12);
 }
 
 TEST(TakeStatedSigmas, HoldsWhatIsExact) {
