@@ -11,6 +11,7 @@
 #include "ba/outliers/classification.h"
 #include "ba/problem/bundle_state.h"
 #include "ba/solver/minimisation.h"
+#include "ba/triangulation_in_place.h"
 #include "rotodom/camera/lens_parameters.h"
 #include "rotodom/types/splitmix64.h"
 #include "rotodom/types/stopwatch.h"
@@ -381,24 +382,51 @@ BundleResult RefineBundle(const BundleProblem& problem,
   return result;
 }
 
-Reconstruction TriangulateTracks(const BundleProblem& problem, const BundleOptions& options) {
+Reconstruction TriangulateInPlace(BundleProblem problem, const BundleOptions& options) {
   BundleState state = MakeBundleState(problem, options);
-  ClassifyAll(options.fine, Placement::kAnywhere, options, state);
-  BundleResult result;
-  TakeResult(problem, state, result);
-  result.reconstruction.cam_from_world = problem.start.cam_from_world;
-  result.reconstruction.center_in_world = problem.start.center_in_world;
-  return std::move(result.reconstruction);
+  for (TrackState& entry : state.tracks) {
+    const auto known = problem.start.point_in_world.find(entry.track->id);
+    entry.has_position = known != problem.start.point_in_world.end();
+    if (entry.has_position) entry.position = known->second;
+  }
+  ClassifyAll(options.fine, Placement::kWhereKnown, options, state);
+  Reconstruction map = std::move(problem.start);
+  map.point_in_world.clear();
+  // In place: of a long sequence the observations fill the memory.
+  for (std::size_t k = 0; k < state.tracks.size(); ++k) {
+    const TrackState& entry = state.tracks[k];
+    Track& track = map.tracks[k];
+    std::size_t count = 0;
+    for (const ObservationState& one : entry.observations) {
+      if (entry.kind != TrackKind::kPoint || !one.used) continue;
+      Observation& kept = track.observations[count++];
+      kept = Observation(*one.observation);
+      kept.bearing = one.bearing;
+    }
+    track.observations.resize(count);
+    if (count > 0)
+      map.point_in_world.emplace_hint(map.point_in_world.end(), track.id, entry.position);
+  }
+  std::erase_if(map.tracks, [](const Track& track) { return track.observations.empty(); });
+  return map;
+}
+
+Reconstruction TriangulateTracks(const BundleProblem& problem, const BundleOptions& options) {
+  return TriangulateInPlace(problem, options);
 }
 
 Reconstruction WithoutShallowPoints(const Reconstruction& reconstruction, double min_angle_deg) {
-  Reconstruction result = reconstruction;
-  result.tracks.clear();
-  result.point_in_world.clear();
-  for (const Track& track : reconstruction.tracks) {
+  Reconstruction deep = reconstruction;
+  DropShallowPoints(min_angle_deg, deep);
+  return deep;
+}
+
+void DropShallowPoints(double min_angle_deg, Reconstruction& reconstruction) {
+  std::vector<PosedRay> rays;
+  std::erase_if(reconstruction.tracks, [&](const Track& track) {
     const auto point = reconstruction.point_in_world.find(track.id);
-    if (point == reconstruction.point_in_world.end()) continue;
-    std::vector<PosedRay> rays;
+    if (point == reconstruction.point_in_world.end()) return true;
+    rays.clear();
     for (const Observation& observation : track.observations) {
       const auto cam_from_world = reconstruction.cam_from_world.find(observation.frame);
       const auto center = reconstruction.center_in_world.find(observation.frame);
@@ -408,11 +436,13 @@ Reconstruction WithoutShallowPoints(const Reconstruction& reconstruction, double
       }
       rays.push_back({cam_from_world->second, center->second, observation.bearing});
     }
-    if (TriangulationAngle(rays, point->second) < min_angle_deg * kRadFromDeg) continue;
-    result.point_in_world.insert(*point);
-    result.tracks.push_back(track);
+    return TriangulationAngle(rays, point->second) < min_angle_deg * kRadFromDeg;
+  });
+  PointMap kept;
+  for (const Track& track : reconstruction.tracks) {
+    kept.insert(*reconstruction.point_in_world.find(track.id));
   }
-  return result;
+  reconstruction.point_in_world = std::move(kept);
 }
 
 }  // namespace rotslam

@@ -1,7 +1,10 @@
 #include "ba/resection.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
+#include <cstddef>
+#include <limits>
 #include <stdexcept>
 #include <utility>
 
@@ -18,8 +21,9 @@ namespace {
 using Vector6d = Eigen::Matrix<double, 6, 1>;
 using Matrix6d = Eigen::Matrix<double, 6, 6>;
 
-// A step that gains less, in squared sigmas, moves the pose by 1e-4 of its standard deviation.
-constexpr double kWorthlessGain = 1e-9;
+// A step that gains less, in squared sigmas, moves the pose by less than 1e-3 of its standard
+// deviation, and what is left after it is far less.
+constexpr double kWorthlessGain = 1e-7;
 
 // Points refute the start's rotation where together with it they cost more than all but one in a
 // thousand would that are as good as its covariance says, and they themselves twice what they cost
@@ -29,8 +33,10 @@ constexpr double kWorthlessGain = 1e-9;
 constexpr double kMostRotationCost = 8.1;
 constexpr double kMostCostRatio = 2.0;
 
-// Steps at each of the wider scales, which only lead to the last one.
+// Steps at each of the wider scales, which only lead to the last one, and how many observations
+// they take.
 constexpr int kCoarseIterations = 3;
+constexpr std::size_t kCoarseObservations = 200;
 
 struct Pose {
   Rotation cam_from_world;
@@ -53,6 +59,62 @@ struct Normal {
   double cost = 0.0;
 };
 
+// Sums of the normal equations with the centre's derivatives in the camera's frame, where they are
+// those of the projection.
+class PoseSums {
+ public:
+  double cost = 0.0;
+
+  // @param J  of the residual by the point in the camera's frame.
+  void Add(const Eigen::Vector3d& in_cam,
+           const Eigen::Matrix<double, 2, 3>& J,
+           const Eigen::Vector2d& residual,
+           double weight) {
+    std::array<double, 6> x;
+    std::array<double, 6> y;
+    // Exp(delta) p = p + delta x p, to first order; the point moves against the centre.
+    const auto fill = [&](int row, std::array<double, 6>& to) {
+      const double a = J(row, 0);
+      const double b = J(row, 1);
+      const double c = J(row, 2);
+      to = {in_cam.y() * c - in_cam.z() * b,
+            in_cam.z() * a - in_cam.x() * c,
+            in_cam.x() * b - in_cam.y() * a,
+            -a,
+            -b,
+            -c};
+    };
+    fill(0, x);
+    fill(1, y);
+    int n = 0;
+    for (int i = 0; i < 6; ++i) {
+      const double wx = weight * x[i];
+      const double wy = weight * y[i];
+      for (int l = 0; l <= i; ++l) lower_[n++] += wx * x[l] + wy * y[l];
+      g_[i] += wx * residual.x() + wy * residual.y();
+    }
+  }
+
+  // @param share  how many observations each one stands for.
+  Normal InWorld(const Eigen::Matrix3d& R_c_w, double share) const {
+    Normal normal;
+    int n = 0;
+    for (int i = 0; i < 6; ++i) {
+      for (int l = 0; l <= i; ++l) normal.H(i, l) = normal.H(l, i) = share * lower_[n++];
+      normal.g[i] = share * g_[i];
+    }
+    normal.H.rightCols<3>() = (normal.H.rightCols<3>() * R_c_w).eval();
+    normal.H.bottomRows<3>() = (R_c_w.transpose() * normal.H.bottomRows<3>()).eval();
+    normal.g.tail<3>() = (R_c_w.transpose() * normal.g.tail<3>()).eval();
+    normal.cost = share * cost;
+    return normal;
+  }
+
+ private:
+  std::array<double, 21> lower_ = {};
+  std::array<double, 6> g_ = {};
+};
+
 class Resection {
  public:
   Resection(const Camera& camera,
@@ -60,67 +122,76 @@ class Resection {
             const ResectionStart& start,
             const ResectionOptions& options)
       : camera_(camera), observations_(observations), start_(start), options_(options) {
+    scales_.reserve(observations.size());
+    for (const PointObservation2D3D& observation : observations) {
+      const double sharpness = 1.0 / observation.sigma_px;
+      scales_.push_back(options.has_motion_blur
+                            ? Eigen::Matrix2d(sharpness * Deblurring(observation.blur))
+                            : Eigen::Matrix2d(sharpness * Eigen::Matrix2d::Identity()));
+    }
     if (start.rotation_covariance) prior_information_ = start.rotation_covariance->inverse();
   }
 
-  // Sigmas per pixel.
-  Eigen::Matrix2d ScaleOf(const PointObservation2D3D& observation) const {
-    if (!options_.has_motion_blur) return Eigen::Matrix2d::Identity() / observation.sigma_px;
-    return Deblurring(observation.blur) / observation.sigma_px;
-  }
-
   // Residual in sigmas; what does not project is far off.
-  double Sigmas(const Pose& pose, const PointObservation2D3D& observation) const {
+  double Sigmas(const Pose& pose, std::size_t k) const {
+    const PointObservation2D3D& observation = observations_[k];
     const auto pixel = Reproject(
         camera_, pose.cam_from_world.Matrix(), pose.center_in_world, observation.point_in_world);
     if (!pixel) return kUnseenResidual_px / observation.sigma_px;
-    return (ScaleOf(observation) * (*pixel - observation.keypoint_px)).norm();
+    return (scales_[k] * (*pixel - observation.keypoint_px)).norm();
   }
 
-  double MedianSigmas(const Pose& pose) const {
+  std::vector<double> AllSigmas(const Pose& pose) const {
     std::vector<double> sigmas;
-    for (const PointObservation2D3D& observation : observations_)
-      sigmas.push_back(Sigmas(pose, observation));
-    return Median(std::move(sigmas));
+    sigmas.reserve(observations_.size());
+    for (std::size_t k = 0; k < observations_.size(); ++k) sigmas.push_back(Sigmas(pose, k));
+    return sigmas;
   }
 
-  bool IsInlier(const Pose& pose, const PointObservation2D3D& observation) const {
-    return Sigmas(pose, observation) * observation.sigma_px <=
-           options_.max_error_px * std::max(1.0, observation.sigma_px);
+  // @param sigmas  residual of observation k.
+  bool IsInlier(std::size_t k, double sigmas) const {
+    const double sigma_px = observations_[k].sigma_px;
+    return sigmas * sigma_px <= options_.max_error_px * std::max(1.0, sigma_px);
   }
 
   // `scale`: of Geman-McClure's loss s^2 / 2 r^2 / (r^2 + s^2); zero: inliers, plainly weighted.
-  Normal Evaluate(const Pose& pose, double scale) const {
-    Normal normal;
+  // `step`: of every so many observations one, which counts for all of them.
+  Normal Evaluate(const Pose& pose, double scale, std::size_t step = 1) const {
+    PoseSums sums;
     const Eigen::Matrix3d R_c_w = pose.cam_from_world.Matrix();
-    for (const PointObservation2D3D& observation : observations_) {
-      if (scale == 0.0 && !IsInlier(pose, observation)) continue;
-      ReprojectionJacobian J;
-      const auto pixel =
-          Reproject(camera_, R_c_w, pose.center_in_world, observation.point_in_world, &J);
-      const Eigen::Vector2d residual =
-          pixel ? Eigen::Vector2d(ScaleOf(observation) * (*pixel - observation.keypoint_px))
-                : Eigen::Vector2d::Constant(kUnseenResidual_px / observation.sigma_px);
+    for (std::size_t k = 0; k < observations_.size(); k += step) {
+      const PointObservation2D3D& observation = observations_[k];
+      const Eigen::Vector3d in_cam = R_c_w * (observation.point_in_world - pose.center_in_world);
+      Eigen::Matrix<double, 2, 3> J;
+      const auto pixel = camera_.Project(in_cam, &J);
+      if (!pixel) {
+        const double unseen = kUnseenResidual_px / observation.sigma_px;
+        if (scale > 0.0) {
+          const double squared = 2.0 * unseen * unseen;
+          sums.cost += 0.5 * squared * scale * scale / (squared + scale * scale);
+        } else if (IsInlier(k, unseen)) {
+          sums.cost += unseen * unseen;
+        }
+        continue;
+      }
+      const Eigen::Vector2d residual = scales_[k] * (*pixel - observation.keypoint_px);
       const double squared = residual.squaredNorm();
+      if (scale == 0.0 && !IsInlier(k, std::sqrt(squared))) continue;
       const double keep = scale == 0.0 ? 1.0 : scale * scale / (squared + scale * scale);
-      normal.cost += 0.5 * squared * keep;
-      if (!pixel) continue;
-      Eigen::Matrix<double, 2, 6> J_pose;
-      J_pose << J.by_rotation, J.by_center;
-      J_pose = ScaleOf(observation) * J_pose;
-      const double weight = keep * keep;
-      normal.H.noalias() += weight * J_pose.transpose() * J_pose;
-      normal.g.noalias() += weight * J_pose.transpose() * residual;
+      sums.cost += 0.5 * squared * keep;
+      const Eigen::Matrix<double, 2, 3> J_scaled = scales_[k] * J;
+      sums.Add(in_cam, J_scaled, residual, keep * keep);
     }
+    Normal normal = sums.InWorld(R_c_w, static_cast<double>(step));
     AddPrior(pose, normal);
     Hold(normal);
     return normal;
   }
 
   // Levenberg-Marquardt at one scale. Returns whether it settled.
-  bool Minimise(double scale, int max_iterations, Pose& pose) const {
+  bool Minimise(double scale, int max_iterations, Pose& pose, std::size_t every = 1) const {
     double damping = 1e-6;
-    Normal normal = Evaluate(pose, scale);
+    Normal normal = Evaluate(pose, scale, every);
     for (int iteration = 0; iteration < max_iterations; ++iteration) {
       Matrix6d H = normal.H;
       H.diagonal() *= 1.0 + damping;
@@ -130,7 +201,7 @@ class Resection {
       const double expected = -0.5 * normal.g.dot(step);
       const Pose next = Moved(pose, step);
       // Most steps are taken, so the derivatives at the next pose are rarely in vain.
-      const Normal next_normal = Evaluate(next, scale);
+      const Normal next_normal = Evaluate(next, scale, every);
       if (next_normal.cost <= normal.cost) {
         pose = next;
         normal = next_normal;
@@ -146,14 +217,27 @@ class Resection {
   // From a start that may be far off: losses are wide at first, so that it still feels the inliers.
   // Returns whether it settled.
   bool Settle(Pose& pose) const {
-    double scale = std::max(options_.loss_scale, 2.0 * MedianSigmas(pose));
+    double scale = std::max(options_.loss_scale, 2.0 * Median(AllSigmas(pose)));
+    const std::size_t every = std::max<std::size_t>(1, observations_.size() / kCoarseObservations);
     for (; scale > options_.loss_scale; scale = std::max(options_.loss_scale, 0.5 * scale)) {
-      Minimise(scale, kCoarseIterations, pose);
+      Minimise(scale, kCoarseIterations, pose, every);
     }
     return Minimise(options_.loss_scale, options_.max_iterations, pose);
   }
 
   double Cost(const Pose& pose) const { return Evaluate(pose, options_.loss_scale).cost; }
+
+  // What the start's rotation may cost at most at a pose where the cost is least: its own share
+  // there, and more than what the points alone would still gain.
+  double MostRotationCost(const Pose& pose) const {
+    constexpr double kMore = 4.0;  // steps of a robust loss come short
+    Resection by_points = *this;
+    by_points.ForgetRotation();
+    const Normal points = by_points.Evaluate(pose, options_.loss_scale);
+    const double gain = 0.5 * points.g.dot(points.H.ldlt().solve(points.g));
+    if (!std::isfinite(gain)) return std::numeric_limits<double>::infinity();
+    return Cost(pose) - points.cost + kMore * std::abs(gain);
+  }
 
   // From here on the start's rotation is no measurement any more.
   void ForgetRotation() { prior_information_.reset(); }
@@ -194,6 +278,7 @@ class Resection {
   const std::vector<PointObservation2D3D>& observations_;
   const ResectionStart& start_;
   const ResectionOptions& options_;
+  std::vector<Eigen::Matrix2d> scales_;  // sigmas per pixel
   std::optional<Eigen::Matrix3d> prior_information_;
 };
 
@@ -248,12 +333,12 @@ std::optional<ResectedPose> Describe(const Pose& pose,
   result.center_in_world = pose.center_in_world;
   double squares = 0.0;
   double squares_in_sigmas = 0.0;
-  for (const PointObservation2D3D& observation : finite) {
-    if (!resection.IsInlier(pose, observation)) continue;
+  const std::vector<double> sigmas = resection.AllSigmas(pose);
+  for (std::size_t k = 0; k < sigmas.size(); ++k) {
+    if (!resection.IsInlier(k, sigmas[k])) continue;
     ++result.num_inliers;
-    const double sigmas = resection.Sigmas(pose, observation);
-    squares_in_sigmas += sigmas * sigmas;
-    const double error_px = sigmas * observation.sigma_px;
+    squares_in_sigmas += sigmas[k] * sigmas[k];
+    const double error_px = sigmas[k] * finite[k].sigma_px;
     squares += error_px * error_px;
   }
   if (result.num_inliers < options.min_inliers) return std::nullopt;
@@ -293,7 +378,8 @@ std::optional<ResectedPose> ResectFrame(const Camera& camera,
   Resection resection(camera, finite, start, options);
   Pose pose = {start.cam_from_world, start.center_in_world};
   if (!resection.Settle(pose)) return std::nullopt;
-  if (start.rotation_covariance && options.refine_rotation) {
+  if (start.rotation_covariance && options.refine_rotation &&
+      resection.MostRotationCost(pose) > kMostRotationCost) {
     Resection by_points = resection;
     by_points.ForgetRotation();
     Pose other = pose;

@@ -15,6 +15,7 @@
 #include "apps/slam/map/stated_sigmas.h"
 #include "apps/slam/map_correction/map_correction.h"
 #include "apps/slam/map_views.h"
+#include "ba/triangulation_in_place.h"
 #include "rotodom/averaging/anchors.h"
 #include "rotodom/averaging/global_averaging.h"
 #include "rotodom/motion_blur/keypoint_blur.h"
@@ -530,27 +531,27 @@ void RegisterRemainingFrames(const Orientations& orientations,
   observer.OnEnd(SlamStage::kFrameRegistration, result);
 }
 
-void MakeCloud(const std::vector<Track>& all_tracks,
+void MakeCloud(std::vector<Track> all_tracks,
                const SlamOptions& options,
                SlamObserver& observer,
                MapResult& result) {
   observer.OnBegin(SlamStage::kCloud, -1);
   BundleOptions bundle_options = options.ba;
   bundle_options.num_threads = options.num_threads;
-  const Reconstruction all_points = MakeCloudOf({result.camera,
-                                                 result.cam_from_world,
-                                                 result.center_in_world,
-                                                 result.map.point_in_world,
-                                                 result.segments},
-                                                all_tracks,
-                                                bundle_options);
-  result.cloud = WithoutShallowPoints(all_points, options.cloud_min_angle_deg);
-  result.num_shallow_points =
-      static_cast<int>(all_points.point_in_world.size() - result.cloud.point_in_world.size());
-  const PointMap rest = WithoutOutliers(result.cloud.point_in_world, options.cloud_outliers);
+  result.cloud = MakeCloudInPlace({result.camera,
+                                   result.cam_from_world,
+                                   result.center_in_world,
+                                   result.map.point_in_world,
+                                   result.segments},
+                                  std::move(all_tracks),
+                                  bundle_options);
+  const auto num_points = result.cloud.point_in_world.size();
+  DropShallowPoints(options.cloud_min_angle_deg, result.cloud);
+  result.num_shallow_points = static_cast<int>(num_points - result.cloud.point_in_world.size());
+  PointMap rest = WithoutOutliers(result.cloud.point_in_world, options.cloud_outliers);
   result.num_cloud_outliers = static_cast<int>(result.cloud.point_in_world.size() - rest.size());
-  result.cloud.point_in_world = rest;
   std::erase_if(result.cloud.tracks, [&](const Track& track) { return !rest.contains(track.id); });
+  result.cloud.point_in_world = std::move(rest);
   observer.OnEnd(SlamStage::kCloud, result);
 }
 
@@ -588,7 +589,7 @@ MapResult BuildMap(const Orientations& orientations,
   } else {
     RegisterRemainingFrames(orientations, all_tracks, options, observer, result);
   }
-  MakeCloud(all_tracks, options, observer, result);
+  MakeCloud(std::move(all_tracks), options, observer, result);
   return result;
 }
 

@@ -21,6 +21,8 @@ namespace {
 constexpr double kInfinity = std::numeric_limits<double>::infinity();
 // Two-view hypotheses for a track in which not all observations agree.
 constexpr int kMaxTrackHypotheses = 20;
+// Rays that a point is triangulated from before its cost is minimised over all of them.
+constexpr std::size_t kMaxRays = 16;
 // Gauss-Newton steps of a point, and the share of its cost that is worth another.
 constexpr int kMaxSteps = 10;
 constexpr double kLeastGain = 1e-4;
@@ -234,14 +236,20 @@ class Classifier {
       if (!(sum.norm() > 0.0)) return std::nullopt;
       return sum.normalized();
     }
-    std::vector<PosedRay> rays;
-    rays.reserve(chosen.size());
+    std::vector<std::size_t> seen;
+    seen.reserve(chosen.size());
     for (std::size_t k = 0; k < chosen.size(); ++k) {
-      if (chosen[k]) {
-        rays.push_back(AsPosedRay(state_, track.observations[k], state_.camera.MeanFocal()));
-      }
+      if (chosen[k]) seen.push_back(k);
     }
-    if (rays.size() < 2) return std::nullopt;
+    if (seen.size() < 2) return std::nullopt;
+    // Of a long track some rays, from the first to the last, say where to start from.
+    const std::size_t count = std::min(seen.size(), kMaxRays);
+    std::vector<PosedRay> rays;
+    rays.reserve(count);
+    for (std::size_t n = 0; n < count; ++n) {
+      const std::size_t k = seen[n * (seen.size() - 1) / (count - 1)];
+      rays.push_back(AsPosedRay(state_, track.observations[k], state_.camera.MeanFocal()));
+    }
     return Triangulate(rays, min_angle_rad_);
   }
 
@@ -288,17 +296,23 @@ class Classifier {
 
   // Whether two of the used rays meet at the smallest angle allowed.
   bool IsDeep(const TrackState& track) const {
+    // Chords instead of angles, of which one comparison with the first ray settles most tracks.
+    const double least = 2.0 * std::sin(0.5 * min_angle_rad_);
     std::vector<Eigen::Vector3d> rays;
+    rays.reserve(track.observations.size());
+    double largest_from_first = 0.0;
     for (const ObservationState& one : track.observations) {
       if (!one.used) continue;
       rays.push_back(
           (track.position - state_.centers[state_.frames[one.frame].center]).normalized());
+      largest_from_first = std::max(largest_from_first, (rays.back() - rays.front()).norm());
     }
+    // Two rays are no farther apart than both are from the first one, together.
+    if (largest_from_first >= least) return true;
+    if (2.0 * largest_from_first < least) return false;
     for (std::size_t b = rays.size(); b-- > 0;) {
       for (std::size_t a = 0; a < b; ++a) {
-        if (std::atan2(rays[a].cross(rays[b]).norm(), rays[a].dot(rays[b])) >= min_angle_rad_) {
-          return true;
-        }
+        if ((rays[a] - rays[b]).squaredNorm() >= least * least) return true;
       }
     }
     return false;
@@ -364,7 +378,9 @@ void ClassifyAll(const BundleRound& round,
     if (placement == Placement::kStays) {
       classifier.Recheck(track);
     } else {
-      classifier.Classify(placement == Placement::kAnywhere, track);
+      classifier.Classify(placement == Placement::kAnywhere ||
+                              (placement == Placement::kWhereKnown && !track.has_position),
+                          track);
     }
   });
   RemoveWeakFrames(classifier, kMinFrameObservations, state);

@@ -12,6 +12,8 @@ enum class Placement {
   // they got there.
   kAnywhere,
   kNearby,  // from where it is, downhill
+  // The same, and anywhere for a track that has not been placed yet.
+  kWhereKnown,
   kStays,
 };
 

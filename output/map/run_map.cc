@@ -152,22 +152,30 @@ MapTrack WithoutPoint(const Track& track) {
           std::vector<std::uint8_t>(track.observations.size(), 0)};
 }
 
-// @param given  of the same track; those in frames that fit are not taken.
-MapTrack WithPoint(const Track& track,
+// @param fitting  a track with its sightings that fit.
+// @param given    of the same track; those in frames that fit are not taken.
+MapTrack WithPoint(Track fitting,
                    const Eigen::Vector3d& point_in_world,
                    const std::vector<Observation>& given) {
-  std::map<FrameId, std::pair<Observation, bool>> sightings;
-  for (const Observation& observation : given) sightings[observation.frame] = {observation, false};
-  for (const Observation& observation : track.observations) {
-    sightings[observation.frame] = {observation, true};
-  }
   MapTrack entry;
-  entry.track = track;
-  entry.track.observations.clear();
   entry.point_in_world = point_in_world;
-  for (const auto& [frame, sighting] : sightings) {
-    entry.track.observations.push_back(sighting.first);
-    entry.fits.push_back(sighting.second);
+  if (given.empty()) {
+    entry.fits.assign(fitting.observations.size(), true);
+    entry.track = std::move(fitting);
+  } else {
+    entry.track.id = fitting.id;
+    entry.track.rgb = fitting.rgb;
+    const auto add = [&](const Observation& observation, bool fits) {
+      entry.track.observations.push_back(observation);
+      entry.fits.push_back(fits);
+    };
+    auto next = given.begin();
+    for (const Observation& observation : fitting.observations) {
+      for (; next != given.end() && next->frame < observation.frame; ++next) add(*next, false);
+      if (next != given.end() && next->frame == observation.frame) ++next;
+      add(observation, true);
+    }
+    for (; next != given.end(); ++next) add(*next, false);
   }
   entry.levels.resize(entry.fits.size(), 0);
   return entry;
@@ -183,7 +191,8 @@ std::vector<MapTrack> JoinTracks(const std::vector<Track>& tracks, const Reconst
   for (const Track& track : solved.tracks) {
     const auto point = solved.point_in_world.find(track.id);
     if (point == solved.point_in_world.end()) continue;
-    joined[track.id] = WithPoint(track, point->second, joined[track.id].track.observations);
+    MapTrack& entry = joined[track.id];
+    entry = WithPoint(track, point->second, entry.track.observations);
   }
   std::vector<MapTrack> list;
   list.reserve(joined.size());

@@ -24,6 +24,8 @@ constexpr float kMinStructure = 0.01F;
 // dominates.
 constexpr float kMinGradientEnergy = 1.0F;
 
+}  // namespace
+
 const PatchLoops& BestPatchLoops() {
 #if defined(__x86_64__)
   switch (UsedSimdLevel()) {
@@ -37,6 +39,8 @@ const PatchLoops& BestPatchLoops() {
 #endif
   return kPatchLoopsBaseline;
 }
+
+namespace {
 
 // Copies the pixels around a patch; the first one is (x, y).
 // @return  false when they leave the image.

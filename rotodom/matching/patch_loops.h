@@ -65,6 +65,21 @@ struct DeformationSums {
   float image_sum, image_values, image_squares;  // of v, of v with the patch's values, of v^2
 };
 
+/// Weight of the pixel that is `offset` floats away.
+struct BlurTap {
+  std::ptrdiff_t offset;
+  float weight;
+};
+
+/// Rows of pixels, and where the weighted means of their pixels go.
+struct BlurRows {
+  static constexpr int kGroup = 8;  // columns that are worked on together
+  const float* pixels;              // where the tap of offset 0 of the first mean lies
+  std::ptrdiff_t step;              // floats from row to row
+  int rows, columns;                // columns: a multiple of kGroup
+  std::uint8_t* means;              // rows by columns, without gaps
+};
+
 /// The loops over the pixels of a patch, compiled for one SimdLevel. All levels give the same
 /// results: sums run in 16 lanes, one per column, that are added in the same order.
 struct PatchLoops {
@@ -91,10 +106,17 @@ struct PatchLoops {
                  const PixelWeights* weights,
                  const DeformationInputs* inputs,
                  DeformationSums* sums);
+  /// Floats of bytes.
+  void (*widen)(const std::uint8_t* pixels, int count, float* to);
+  /// Rounded weighted means of the pixels around each of them; the weights' sum is one.
+  void (*blur)(const BlurTap* taps, int num_taps, const BlurRows* rows);
 };
 
 extern const PatchLoops kPatchLoopsBaseline;
 extern const PatchLoops kPatchLoopsAvx2;
 extern const PatchLoops kPatchLoopsAvx512;
+
+/// Those of UsedSimdLevel().
+const PatchLoops& BestPatchLoops();
 
 }  // namespace rotslam

@@ -7,20 +7,15 @@
 
 #include <Eigen/Dense>
 
+#include "rotodom/matching/patch_loops.h"
+
 namespace rotslam {
 namespace {
 
 // Row lengths of windows are multiples of this.
-constexpr int kLanes = 8;
-using Lanes = Eigen::Map<Eigen::Array<float, kLanes, 1>>;
+constexpr int kLanes = BlurRows::kGroup;
 
 int RoundedUp(int size) { return (size + kLanes - 1) / kLanes * kLanes; }
-
-// A blurred part of an image around a point.
-struct BlurredWindow {
-  cv::Mat pixels;
-  Eigen::Vector2d origin_px;  // position of its first pixel in the image
-};
 
 // Weight of the pixel at an offset.
 struct Tap {
@@ -28,12 +23,26 @@ struct Tap {
   float weight;
 };
 
+// Memory for one window, which every call of a thread uses again.
+struct WindowMemory {
+  std::vector<Tap> taps;
+  std::vector<BlurTap> offsets;
+  std::vector<float> pixels;
+  std::vector<std::uint8_t> means;
+};
+
+// A blurred part of an image around a point.
+struct BlurredWindow {
+  cv::Mat pixels;             // in a WindowMemory
+  Eigen::Vector2d origin_px;  // position of its first pixel in the image
+};
+
 // Weights of the mean along a blur vector, bilinear between pixels.
-std::vector<Tap> TapsOf(const Eigen::Vector2d& blur_px) {
+void FindTaps(const Eigen::Vector2d& blur_px, std::vector<Tap>& taps) {
   // At least two steps, so that the smoothing grows continuously from short blur vectors on.
   const int num_steps =
       blur_px.isZero() ? 1 : std::max(2, static_cast<int>(std::ceil(blur_px.norm())));
-  std::vector<Tap> taps;
+  taps.clear();
   const auto add = [&](const Eigen::Vector2i& offset, double weight) {
     if (weight == 0.0) return;
     // Steps are at most a pixel long, so only the taps of the last two steps can be at the same
@@ -53,54 +62,57 @@ std::vector<Tap> TapsOf(const Eigen::Vector2d& blur_px) {
     add(whole + Eigen::Vector2i(0, 1), (1.0 - part.x()) * part.y());
     add(whole + Eigen::Vector2i(1, 1), part.x() * part.y());
   }
-  return taps;
 }
 
 // Copies a window row by row; border pixels are replicated.
-std::vector<float> CopyWindow(const cv::Mat& image,
-                              const Eigen::Vector2i& origin,
-                              const Eigen::Vector2i& size) {
+void CopyWindow(const cv::Mat& image,
+                const Eigen::Vector2i& origin,
+                const Eigen::Vector2i& size,
+                std::vector<float>& window) {
+  const PatchLoops& loops = BestPatchLoops();
   const bool is_inside = origin.x() >= 0 && origin.x() + size.x() <= image.cols;
-  std::vector<float> window(static_cast<std::size_t>(size.x()) * size.y());
+  window.resize(static_cast<std::size_t>(size.x()) * size.y());
   float* to = window.data();
   for (int y = origin.y(); y < origin.y() + size.y(); ++y, to += size.x()) {
     const std::uint8_t* row = image.ptr<std::uint8_t>(std::clamp(y, 0, image.rows - 1));
     if (is_inside) {
-      std::copy(row + origin.x(), row + origin.x() + size.x(), to);
+      loops.widen(row + origin.x(), size.x(), to);
       continue;
     }
     for (int x = 0; x < size.x(); ++x) {
       to[x] = static_cast<float>(row[std::clamp(origin.x() + x, 0, image.cols - 1)]);
     }
   }
-  return window;
 }
 
 // The mean of the image along the blur vector, for each pixel within `half_side` of the centre.
 BlurredWindow BlurredWindowAround(const cv::Mat& image,
                                   const Eigen::Vector2d& center_px,
                                   const Eigen::Vector2d& blur_px,
-                                  int half_side) {
+                                  int half_side,
+                                  WindowMemory& memory) {
   const int side = 2 * half_side + 1;
   const int stride = RoundedUp(side);
   const Eigen::Vector2i margin = (0.5 * blur_px.cwiseAbs()).array().ceil().cast<int>() + 1;
   const Eigen::Vector2i origin(static_cast<int>(std::lround(center_px.x())) - half_side,
                                static_cast<int>(std::lround(center_px.y())) - half_side);
   const Eigen::Vector2i size(stride + 2 * margin.x(), side + 2 * margin.y());
-  std::vector<float> pixels = CopyWindow(image, origin - margin, size);
-  std::vector<float> mean(static_cast<std::size_t>(side) * stride, 0.5F);  // rounds
-  for (const Tap& tap : TapsOf(blur_px)) {
-    const Eigen::Vector2i first = margin + tap.offset;
-    for (int y = 0; y < side; ++y) {
-      float* from =
-          pixels.data() + static_cast<std::ptrdiff_t>(first.y() + y) * size.x() + first.x();
-      float* to = mean.data() + static_cast<std::ptrdiff_t>(y) * stride;
-      for (int x = 0; x < stride; x += kLanes) Lanes(to + x) += tap.weight * Lanes(from + x);
-    }
+  CopyWindow(image, origin - margin, size, memory.pixels);
+  FindTaps(blur_px, memory.taps);
+  memory.offsets.clear();
+  for (const Tap& tap : memory.taps) {
+    memory.offsets.push_back(
+        {static_cast<std::ptrdiff_t>(tap.offset.y()) * size.x() + tap.offset.x(), tap.weight});
   }
-  BlurredWindow blurred{cv::Mat(side, stride, CV_8U), origin.cast<double>()};
-  std::copy(mean.begin(), mean.end(), blurred.pixels.data);
-  return blurred;
+  memory.means.resize(static_cast<std::size_t>(side) * stride);
+  const BlurRows rows{
+      memory.pixels.data() + static_cast<std::ptrdiff_t>(margin.y()) * size.x() + margin.x(),
+      size.x(),
+      side,
+      stride,
+      memory.means.data()};
+  BestPatchLoops().blur(memory.offsets.data(), static_cast<int>(memory.offsets.size()), &rows);
+  return {cv::Mat(side, stride, CV_8U, memory.means.data()), origin.cast<double>()};
 }
 
 }  // namespace
@@ -132,19 +144,30 @@ std::optional<PatchAlignment> AlignBlurredPatch(const BlurredPatch& patch,
   const double stretch = view_from_target.cwiseAbs().rowwise().sum().maxCoeff();
   const double longest_px = std::max(blur_in_view.norm(), blur_in_target.norm());
   if (!(longest_px <= kLongestBlurPx && stretch <= kMostStretch)) return std::nullopt;
+  thread_local WindowMemory memory_of_view;
+  thread_local WindowMemory memory_of_target;
   const BlurredWindow from =
       BlurredWindowAround(patch.image,
                           patch.center_px,
                           blur_in_view,
-                          static_cast<int>(std::ceil(std::max(1.0, stretch) * kReach)));
+                          static_cast<int>(std::ceil(std::max(1.0, stretch) * kReach)),
+                          memory_of_view);
   const auto sampled =
       PatchTemplate::Sample(from.pixels, patch.center_px - from.origin_px, patch.target_from_view);
   if (!sampled) return std::nullopt;
-  const BlurredWindow in = BlurredWindowAround(
-      target, start_px, blur_in_target, kReach + static_cast<int>(std::ceil(max_step_px)));
-  auto found = AlignPatch(*sampled, in.pixels, start_px - in.origin_px, max_step_px);
-  if (found) found->center_px += in.origin_px;
-  return found;
+  // Most patches are found nearby, where a small window is enough; one that leaves it is sought
+  // again in the whole one.
+  constexpr int kNearPx = 2;
+  const int reach_px = static_cast<int>(std::ceil(max_step_px));
+  for (const int window_px : {std::min(kNearPx, reach_px), reach_px}) {
+    const BlurredWindow in =
+        BlurredWindowAround(target, start_px, blur_in_target, kReach + window_px, memory_of_target);
+    auto found = AlignPatch(*sampled, in.pixels, start_px - in.origin_px, max_step_px);
+    if (!found && window_px < reach_px) continue;
+    if (found) found->center_px += in.origin_px;
+    return found;
+  }
+  return std::nullopt;
 }
 
 }  // namespace rotslam

@@ -104,6 +104,14 @@ void Warn(const TrackedInput& tracked,
            : std::string()));
 }
 
+// What only tracking and the estimate of a lens ask of features.
+void DropTrackersPart(Orientations& orientations) {
+  for (auto& [frame, features] : orientations.features) {
+    features.covariances_px = {};
+    features.tracks = {};
+  }
+}
+
 }  // namespace
 
 int FinishRun(TrackedInput& tracked, const RunOutputFlags& flags) {
@@ -126,6 +134,7 @@ int FinishRun(TrackedInput& tracked, const RunOutputFlags& flags) {
     return Interruption::kExitCode;
   }
 
+  DropTrackersPart(tracked.orientations);
   MapResult positions = [&] {
     const EndAtInterruption end_at_interruption(tracked.interruption, end_early);
     return BuildMap(orientations, tracked.options, &tracked.frames, tracked.observer);
@@ -155,7 +164,14 @@ int FinishRun(TrackedInput& tracked, const RunOutputFlags& flags) {
   for (const CheckReason& reason : CheckRun(tracked.directory).reasons) {
     if (reason.warns) progress.Warn(reason.frames + ": " + reason.text);
   }
-  if (flags.use_report) WriteReportOfRun(tracked.directory, flags.common, progress);
+  if (flags.use_report) {
+    // The report reads what has been written; that is not to be in memory twice.
+    tracked.orientations.features.clear();
+    tracked.orientations.edge_matches = {};
+    tracked.orientations.places.clear();
+    positions.map.tracks = positions.keyframe_tracks = {};
+    WriteReportOfRun(tracked.directory, flags.common, progress);
+  }
   tracked.checkpoint.Remove();
   progress.Say("wrote " + tracked.directory.string() +
                ": trajectory_tum.txt, trajectory_kitti.txt, keyframes_tum.txt, "

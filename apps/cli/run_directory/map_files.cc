@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <cstddef>
+#include <iterator>
 #include <map>
 #include <utility>
 #include <vector>
@@ -17,37 +19,79 @@ namespace {
 
 constexpr std::uint8_t kUnknownLevel = 255;
 
-// Gives each sighting of `tracks` that is in the map the level of its frame's feature whose
+// A feature's place and pyramid level; in the order of the places.
+struct PlacedLevel {
+  double x;
+  double y;
+  int level;
+};
+
+std::vector<PlacedLevel> LevelsByPlace(const Features& features) {
+  std::vector<PlacedLevel> levels;
+  levels.reserve(features.keypoints_px.size());
+  for (int k = 0; k < features.size(); ++k) {
+    const Eigen::Vector2d& keypoint_px = features.keypoints_px[k];
+    levels.push_back({keypoint_px.x(), keypoint_px.y(), features.levels[k]});
+  }
+  // Of two features in one place the last one counts.
+  std::stable_sort(levels.begin(), levels.end(), [](const PlacedLevel& a, const PlacedLevel& b) {
+    return std::pair(a.x, a.y) < std::pair(b.x, b.y);
+  });
+  return levels;
+}
+
+// Level of the feature at this place, to the last bit; null: there is none.
+const PlacedLevel* LevelAt(const std::vector<PlacedLevel>& levels, const Eigen::Vector2d& px) {
+  const auto after = std::upper_bound(
+      levels.begin(), levels.end(), px, [](const Eigen::Vector2d& at, const PlacedLevel& level) {
+        return std::pair(at.x(), at.y()) < std::pair(level.x, level.y);
+      });
+  if (after == levels.begin()) return nullptr;
+  const PlacedLevel& found = *std::prev(after);
+  return found.x == px.x() && found.y == px.y() ? &found : nullptr;
+}
+
+// The map's observation of a track in a frame; null: there is none.
+std::uint8_t* FindLevelOf(TrackId id, FrameId frame, RunMap& map) {
+  const auto entry = std::lower_bound(
+      map.tracks.begin(), map.tracks.end(), id, [](const MapTrack& track, TrackId wanted) {
+        return track.track.id < wanted;
+      });
+  if (entry == map.tracks.end() || entry->track.id != id) return nullptr;
+  const std::vector<Observation>& observations = entry->track.observations;
+  const auto seen = std::lower_bound(
+      observations.begin(), observations.end(), frame, [](const Observation& one, FrameId wanted) {
+        return one.frame < wanted;
+      });
+  if (seen == observations.end() || seen->frame != frame) return nullptr;
+  return &entry->levels[static_cast<std::size_t>(seen - observations.begin())];
+}
+
+// Gives each sighting of a track that is in the map the level of its frame's feature whose
 // keypoint it is to the last bit.
+// @param track_at  track number k of `num_tracks`.
+template <class TrackAt>
 void FindLevels(const std::map<FrameId, Features>& features,
-                const std::vector<Track>& tracks,
+                std::size_t num_tracks,
+                const TrackAt& track_at,
                 RunMap& map) {
-  std::map<FrameId, std::vector<std::pair<TrackId, Eigen::Vector2d>>> sightings;
-  for (const Track& track : tracks) {
-    for (const Observation& seen : track.observations) {
-      sightings[seen.frame].emplace_back(track.id, seen.keypoint_px);
+  std::map<FrameId, std::vector<ObservationIndex>> sightings;
+  for (std::size_t t = 0; t < num_tracks; ++t) {
+    const std::vector<Observation>& observations = track_at(t).observations;
+    for (std::size_t k = 0; k < observations.size(); ++k) {
+      sightings[observations[k].frame].push_back({static_cast<int>(t), static_cast<int>(k)});
     }
   }
   for (const auto& [frame, of_frame] : sightings) {
     const auto found = features.find(frame);
     if (found == features.end()) continue;
-    std::map<std::pair<double, double>, int> level_at;
-    for (int k = 0; k < found->second.size(); ++k) {
-      const Eigen::Vector2d& keypoint_px = found->second.keypoints_px[k];
-      level_at[{keypoint_px.x(), keypoint_px.y()}] = found->second.levels[k];
-    }
-    for (const auto& [id, keypoint_px] : of_frame) {
-      const auto level = level_at.find({keypoint_px.x(), keypoint_px.y()});
-      const auto entry = std::lower_bound(
-          map.tracks.begin(), map.tracks.end(), id, [](const MapTrack& track, TrackId wanted) {
-            return track.track.id < wanted;
-          });
-      if (level == level_at.end() || entry == map.tracks.end() || entry->track.id != id) continue;
-      const std::vector<Observation>& observations = entry->track.observations;
-      for (std::size_t k = 0; k < observations.size(); ++k) {
-        if (observations[k].frame != frame) continue;
-        entry->levels[k] = static_cast<std::uint8_t>(level->second);
-      }
+    const std::vector<PlacedLevel> levels = LevelsByPlace(found->second);
+    for (const auto& [t, k] : of_frame) {
+      const Track& track = track_at(static_cast<std::size_t>(t));
+      const PlacedLevel* level = LevelAt(levels, track.observations[k].keypoint_px);
+      if (level == nullptr) continue;
+      std::uint8_t* const of_sighting = FindLevelOf(track.id, frame, map);
+      if (of_sighting != nullptr) *of_sighting = static_cast<std::uint8_t>(level->level);
     }
   }
 }
@@ -62,6 +106,7 @@ void GuessUnknownLevels(RunMap& map) {
     for (std::size_t k = 0; k < entry.levels.size(); ++k) {
       if (entry.levels[k] != kUnknownLevel) known.push_back(k);
     }
+    if (known.size() == entry.levels.size()) continue;
     const std::vector<Observation>& observations = entry.track.observations;
     const auto distance = [&](std::size_t k) {
       return (*entry.point_in_world - centers.at(observations[k].frame)).norm();
@@ -87,16 +132,28 @@ void GuessUnknownLevels(RunMap& map) {
   }
 }
 
-// Joins tracks, and finds the pyramid level of each observation.
-// @param tracks  as the tracker made them.
-void SetTracks(const std::map<FrameId, Features>& features,
-               const std::vector<Track>& tracks,
-               std::vector<MapTrack> joined,
-               RunMap& map) {
-  map.tracks = std::move(joined);
+// The tracks with a point, which the reconstruction loses: JoinTracks in the same memory.
+std::vector<MapTrack> TakeTracks(Reconstruction& solved) {
+  std::vector<MapTrack> list;
+  list.reserve(solved.tracks.size());
+  for (Track& track : solved.tracks) {
+    const auto point = solved.point_in_world.find(track.id);
+    if (point == solved.point_in_world.end()) continue;
+    MapTrack& entry = list.emplace_back();
+    entry.track = std::move(track);
+    entry.point_in_world = point->second;
+    entry.fits.assign(entry.track.observations.size(), true);
+  }
+  solved.tracks = {};
+  std::sort(list.begin(), list.end(), [](const MapTrack& a, const MapTrack& b) {
+    return a.track.id < b.track.id;
+  });
+  return list;
+}
+
+// Levels that no sighting has told yet.
+void ForgetLevels(RunMap& map) {
   for (MapTrack& entry : map.tracks) entry.levels.assign(entry.fits.size(), kUnknownLevel);
-  FindLevels(features, tracks, map);
-  GuessUnknownLevels(map);
 }
 
 // The verified matches of the view-graph's edges.
@@ -151,7 +208,7 @@ ViewGraphMatches MatchesOf(const Orientations& orientations) {
 void WriteMaps(const std::filesystem::path& directory,
                const Sequence& sequence,
                const Orientations& orientations,
-               const MapResult& positions,
+               MapResult& positions,
                const FeatureOptions& features) {
   RunMap map;
   map.level_scale = features.scale_factor;
@@ -171,13 +228,27 @@ void WriteMaps(const std::filesystem::path& directory,
   for (const RelativeRotation& edge : orientations.graph.edges()) {
     map.edges.push_back({edge.i, edge.j, edge.num_inliers, edge.rotation_only});
   }
-  SetTracks(orientations.features,
-            positions.keyframe_tracks,
-            JoinTracks(positions.keyframe_tracks, positions.map),
-            map);
+  // Bundle adjustment may have found other keypoints than the tracker.
+  const std::vector<Track>& tracked = positions.keyframe_tracks;
+  map.tracks = JoinTracks(tracked, positions.map);
+  ForgetLevels(map);
+  FindLevels(
+      orientations.features,
+      tracked.size(),
+      [&](std::size_t k) -> const Track& { return tracked[k]; },
+      map);
+  GuessUnknownLevels(map);
   WriteRunMap(directory / "map.bin", map);
-  SetTracks(orientations.features, positions.cloud.tracks, JoinTracks({}, positions.cloud), map);
+  map.tracks = TakeTracks(positions.cloud);
+  ForgetLevels(map);
+  FindLevels(
+      orientations.features,
+      map.tracks.size(),
+      [&](std::size_t k) -> const Track& { return map.tracks[k].track; },
+      map);
+  GuessUnknownLevels(map);
   WriteRunMap(directory / "map_all_frames.bin", map);
+  map.tracks.clear();
   WriteThumbnails(directory / "thumbnails.bin",
                   {kThumbnailWidth, kThumbnailHeight, orientations.thumbnails});
   WriteViewGraphMatches(directory / "matches.bin", MatchesOf(orientations));

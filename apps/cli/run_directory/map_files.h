@@ -11,11 +11,12 @@ namespace rotslam {
 /// Writes what `rotslam export` reads: map.bin, the keyframes' map with all their tracks,
 /// map_all_frames.bin, the cloud as all frames see it, matches.bin, the verified matches of the
 /// view-graph, and thumbnails.bin, what the frames looked like.
-/// @param features  with which the orientations were found.
+/// @param positions  loses the tracks of its cloud, so that they are not in memory twice.
+/// @param features   with which the orientations were found.
 void WriteMaps(const std::filesystem::path& directory,
                const Sequence& sequence,
                const Orientations& orientations,
-               const MapResult& positions,
+               MapResult& positions,
                const FeatureOptions& features);
 
 }  // namespace rotslam

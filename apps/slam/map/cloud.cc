@@ -1,16 +1,26 @@
 #include "apps/slam/map/cloud.h"
 
+#include <utility>
+
+#include "ba/triangulation_in_place.h"
+
 namespace rotslam {
 
 Reconstruction MakeCloudOf(const CloudSources& sources,
                            const std::vector<Track>& tracks,
                            const BundleOptions& options) {
+  return MakeCloudInPlace(sources, tracks, options);
+}
+
+Reconstruction MakeCloudInPlace(const CloudSources& sources,
+                                std::vector<Track> tracks,
+                                const BundleOptions& options) {
   BundleProblem problem;
   problem.camera = sources.camera;
   problem.start.cam_from_world = sources.cam_from_world;
   problem.start.center_in_world = sources.center_in_world;
   problem.start.point_in_world = sources.point_in_world;
-  problem.start.tracks = tracks;
+  problem.start.tracks = std::move(tracks);
   std::erase_if(problem.start.tracks, [](const Track& track) {
     return static_cast<int>(track.observations.size()) < kMinTrackObservations;
   });
@@ -20,7 +30,7 @@ Reconstruction MakeCloudOf(const CloudSources& sources,
         problem.shared_center[frame] = segment.first;
     }
   }
-  return TriangulateTracks(problem, options);
+  return TriangulateInPlace(std::move(problem), options);
 }
 
 }  // namespace rotslam

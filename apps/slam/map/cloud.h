@@ -26,4 +26,9 @@ Reconstruction MakeCloudOf(const CloudSources& sources,
                            const std::vector<Track>& tracks,
                            const BundleOptions& options);
 
+/// The same in the memory of `tracks`.
+Reconstruction MakeCloudInPlace(const CloudSources& sources,
+                                std::vector<Track> tracks,
+                                const BundleOptions& options);
+
 }  // namespace rotslam

@@ -3,10 +3,12 @@
 #include <algorithm>
 #include <cmath>
 #include <string>
+#include <vector>
 
 #include <gtest/gtest.h>
 
 #include "rotodom/motion_blur/keypoint_blur.h"
+#include "rotodom/simd/simd_level.h"
 #include "rotodom/tracking/tracking.h"
 #include "tests/rotodom/tracking/turning_views.h"
 
@@ -132,6 +134,44 @@ TEST(AlignBlurredPatch, RefusesWhatNoImageShows) {
   EXPECT_FALSE(align(same, {std::nan(""), 0.0}));
   EXPECT_FALSE(align(1e-4 * same, {1.0, 0.0}));
   EXPECT_FALSE(align(Eigen::Matrix2d::Zero(), {1.0, 0.0}));
+}
+
+// What AlignBlurredPatch answers for many patches, places and blur vectors.
+std::vector<double> AlignMany(int& num_found) {
+  const FilmedStart film = FilmStart(Start({0.0, 10.0, 0.0}), 7, kExposure_s);
+  const View& from = film.views[0];
+  const View& in = film.views[6];
+  const Rotation in_from = film.cam_from_world[6] * film.cam_from_world[0].Inverse();
+  std::vector<double> all;
+  num_found = 0;
+  for (int index = 0; index < in.features.size(); ++index) {
+    const int before = FindTrack(from.features, in.features.tracks[index]);
+    if (before < 0) continue;
+    const Eigen::Vector2d blur_px(1.0 + index % 13, index % 5 - 2.0);
+    const BlurredPatch patch{from.pyramid.levels.front(),
+                             from.features.keypoints_px[before],
+                             PatchWarp(SmallCamera(), from.features.bearings[before], in_from),
+                             {0.5, 0.25 * (index % 7)}};
+    // Some starts lie so far from the place that it is outside the small window.
+    const Eigen::Vector2d start_px =
+        in.features.keypoints_px[index] + Eigen::Vector2d(index % 2 == 0 ? 4.0 : 0.3, 0.2);
+    const auto found = AlignBlurredPatch(patch, in.pyramid.levels.front(), start_px, blur_px, 8.0);
+    if (!found) continue;
+    ++num_found;
+    all.insert(all.end(), {found->center_px.x(), found->center_px.y(), found->correlation});
+  }
+  return all;
+}
+
+TEST(AlignBlurredPatch, EveryLevelOfInstructionsGivesTheSame) {
+  int num_found = 0;
+  LimitSimdLevel(SimdLevel::kBaseline);
+  const std::vector<double> baseline = AlignMany(num_found);
+  EXPECT_GT(num_found, 50);
+  LimitSimdLevel(SimdLevel::kAvx2);
+  EXPECT_EQ(AlignMany(num_found), baseline);
+  LimitSimdLevel(SimdLevel::kAvx512);
+  EXPECT_EQ(AlignMany(num_found), baseline);
 }
 
 }  // namespace
