@@ -1,5 +1,7 @@
+#include <atomic>
 #include <filesystem>
 #include <string>
+#include <thread>
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -47,6 +49,40 @@ TEST_F(LiveTest, EndsWithTheResultOfRunAlsoWhereFramesWereLeftOut) {
       EXPECT_TRUE(ReadWholeFile(Out() / file) == ReadWholeFile(run / file)) << flag << file;
     }
   }
+}
+
+// Poses as emitted are the same bytes where another program keeps the other core busy.
+TEST_F(LiveTest, EmitsTheSameBytesOnABusyMachine) {
+  ASSERT_EQ(LiveFromPipe("--wait").exit_code, 0);
+  const std::string expected = ReadWholeFile(Out() / "live_trajectory_tum.txt");
+  ASSERT_GT(expected.size(), 1000U);
+  std::atomic<bool> is_over = false;
+  std::thread other([&] {
+    while (!is_over) {
+    }
+  });
+  const CommandResult busy = LiveFromPipe("--wait");
+  is_over = true;
+  other.join();
+  ASSERT_EQ(busy.exit_code, 0) << busy.error;
+  EXPECT_TRUE(ReadWholeFile(Out() / "live_trajectory_tum.txt") == expected);
+}
+
+// A source that stalls is told about and waited for.
+TEST_F(LiveTest, WaitsForASourceThatStalls) {
+  const std::string images = Quoted((Good() / "rgb").string());
+  const CommandResult live =
+      Rotslam({"live",
+               "-",
+               "--camera=" + (Good() / "camera.yaml").string(),
+               "--fps=30",
+               "--no-report",
+               "--wait",
+               "--out=" + Out().string()},
+              "{ cat " + images + "/*.png; sleep 4; cat " + images + "/*.png; } |",
+              "");
+  ASSERT_EQ(live.exit_code, 0) << live.error;
+  EXPECT_THAT(live.error, HasSubstr("the source stalls"));
 }
 
 TEST_F(LiveTest, RefusesWhatItCannotDo) {
