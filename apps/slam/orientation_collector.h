@@ -35,6 +35,8 @@ class OrientationCollector {
   Orientations Finish(SlamObserver& observer, const std::function<void()>& commit);
 
   const OdometryResult& odometry() const { return odometry_.result(); }
+  /// Whether a loop is about to change orientations of older frames.
+  bool is_averaging() const { return odometry_.is_averaging(); }
   const FrameMasks& masks() const { return orientations_.masks; }
   const Camera& camera() const { return orientations_.camera; }
   /// Whether Take() needs the points of a frame.

@@ -103,7 +103,7 @@ LoopReport LoopClosure::AddFrame(const FrameEstimate& estimate,
                                  const DisjointSets& pieces) {
   timestamps_s_[estimate.frame] = estimate.timestamp_s;
   LoopReport report = Finish(cam_from_world, pieces);
-  if (IsNewPlace(estimate)) pending_ = Describe(estimate, image);
+  if (IsNewPlace(estimate)) BeginDescription(estimate, image);
   return report;
 }
 
@@ -128,7 +128,13 @@ void LoopClosure::Replay(const FrameEstimate& estimate,
   pending_ = {{*std::move(corners), estimate.features.tracks, {}}, estimate.features.keypoints_px};
 }
 
+const Features* LoopClosure::NewestCorners() {
+  EndDescription();
+  return pending_ ? &pending_->place.corners : nullptr;
+}
+
 std::optional<LoopClosure::Place> LoopClosure::TakePending(const RotationMap& cam_from_world) {
+  EndDescription();
   if (!pending_) return std::nullopt;
   PendingPlace pending = *std::move(pending_);
   pending_.reset();
@@ -200,19 +206,37 @@ bool LoopClosure::IsNewPlace(const FrameEstimate& estimate) const {
   return CountCommonTracks(last, features.tracks) < options_.place_overlap * features.size();
 }
 
-LoopClosure::PendingPlace LoopClosure::Describe(const FrameEstimate& estimate,
-                                                const MaskedImage& image) {
-  const Stopwatch stopwatch(seconds_.description);
+void LoopClosure::BeginDescription(const FrameEstimate& estimate, const MaskedImage& image) {
   PendingPlace pending;
-  Place& place = pending.place;
-  place.corners.frame = estimate.frame;
-  const ImagePyramid pyramid = BuildPyramid(ToGrey(image.image), feature_options_, image.mask);
-  DetectFeatures(pyramid, camera_, feature_options_, tools_.num_threads, place.corners);
-  DescribeFeatures(pyramid, tools_.num_threads, place.corners);
-  place.corners.rgb = {};
-  place.tracks = estimate.features.tracks;
+  pending.place.corners.frame = estimate.frame;
+  pending.place.tracks = estimate.features.tracks;
   pending.features_px = estimate.features.keypoints_px;
-  return pending;
+  // The caller may use the image's memory again.
+  auto describe = [this,
+                   pending = std::move(pending),
+                   grey = ToGrey(image.image).clone(),
+                   mask = image.mask]() mutable {
+    DescribedPlace described;
+    {
+      const Stopwatch stopwatch(described.seconds);
+      Features& corners = pending.place.corners;
+      const ImagePyramid pyramid = BuildPyramid(grey, feature_options_, mask);
+      DetectFeatures(pyramid, camera_, feature_options_, tools_.num_threads, corners);
+      DescribeFeatures(pyramid, tools_.num_threads, corners);
+      corners.rgb = {};
+    }
+    described.pending = std::move(pending);
+    return described;
+  };
+  const auto launch = tools_.num_threads > 1 ? std::launch::async : std::launch::deferred;
+  description_ = std::async(launch, std::move(describe));
+}
+
+void LoopClosure::EndDescription() {
+  if (!description_.valid()) return;
+  DescribedPlace described = description_.get();
+  seconds_.description += described.seconds;
+  pending_ = std::move(described.pending);
 }
 
 bool LoopClosure::CorrectRollingShutter(const RotationMap& cam_from_world,

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <cstdint>
+#include <future>
 #include <map>
 #include <memory>
 #include <optional>
@@ -108,7 +109,7 @@ class LoopClosure {
   LoopReport Finish(const RotationMap& cam_from_world, const DisjointSets& pieces);
 
   /// Described corners of the newest frame, if it becomes a place; else null.
-  const Features* NewestCorners() const { return pending_ ? &pending_->place.corners : nullptr; }
+  const Features* NewestCorners();
 
   /// Replays a frame from the results of AddFrame, without the image and without searching for
   /// loops.
@@ -140,8 +141,16 @@ class LoopClosure {
     std::vector<Eigen::Vector2d> features_px;  // keypoints of the frame
   };
 
+  // A pending place while its corners are found, and the time that this takes.
+  struct DescribedPlace {
+    PendingPlace pending;
+    double seconds = 0.0;
+  };
+
   bool IsNewPlace(const FrameEstimate& estimate) const;
-  PendingPlace Describe(const FrameEstimate& estimate, const MaskedImage& image);
+  // Finds and describes the corners; with several threads while the stream goes on.
+  void BeginDescription(const FrameEstimate& estimate, const MaskedImage& image);
+  void EndDescription();
   // The pending place after the rotation that follows it is known; nullopt where there is none or
   // its corners are not known accurately enough.
   std::optional<Place> TakePending(const RotationMap& cam_from_world);
@@ -170,6 +179,7 @@ class LoopClosure {
   CandidateFinder finder_;
   UnconfirmedEdges unconfirmed_;
   std::map<FrameId, Place> places_;
+  std::future<DescribedPlace> description_;  // of the place that is pending next
   std::optional<PendingPlace> pending_;
   std::map<FrameId, double> timestamps_s_;
   LoopSeconds seconds_;

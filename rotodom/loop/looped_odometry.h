@@ -67,6 +67,8 @@ class LoopedOdometry {
   /// covariances. Returns the loop candidates of the last frame.
   std::vector<LoopCheck> Finish();
 
+  /// Whether a loop is about to change orientations of older frames.
+  bool is_averaging() const { return orientations_.is_averaging(); }
   /// All frames so far.
   const OdometryResult& result() const { return orientations_.result(); }
   OdometryResult&& TakeResult() { return orientations_.TakeResult(); }

@@ -50,6 +50,8 @@ class LoopedOrientations {
     result_.covariance[frame] = covariance;
   }
 
+  /// Whether an averaging runs whose result is still to be taken over.
+  bool is_averaging() const { return averaging_.has_value(); }
   /// Connected components of the view-graph over reliable edges, by frame.
   const DisjointSets& pieces() const { return pieces_; }
   const OdometryResult& result() const { return result_; }

@@ -33,6 +33,9 @@ double Share(std::vector<double>& values, double share) {
 // A stream that is broken for long is not told about for every frame.
 constexpr int kMaxWarnings = 5;
 
+// A source is told to stall when it has given nothing for so long, s.
+constexpr double kStallTime = 3.0;
+
 // Whether it worked. A reader that has gone ends the poses, not the session.
 bool WritePose(PoseOutput& poses, const LiveEstimate& estimate, Progress& progress) {
   try {
@@ -55,8 +58,18 @@ LiveSummary RunLiveSession(FramePump& frames,
   LiveSummary summary;
   int num_problems = 0;
   bool writes_poses = outputs.poses != nullptr;
+  auto newest = std::chrono::steady_clock::now();
+  bool is_stalled = false;
+  const auto should_stop_waiting = [&] {
+    if (!is_stalled && SecondsSince(newest) > kStallTime) {
+      is_stalled = true;
+      progress.Warn("no frame for " + Fixed(kStallTime) +
+                    " s: the source stalls and is waited for");
+    }
+    return should_stop();
+  };
   progress.StartStage("live", -1);
-  while (std::optional<Frame> frame = frames.Next(should_stop)) {
+  while (std::optional<Frame> frame = frames.Next(should_stop_waiting)) {
     if (!frame->image.empty() && frame->image.size() != size) {
       frame->problem = frame->name + ": is " + SizeOf(frame->image.size()) +
                        ", the camera's images are " + SizeOf(size) + "; left out";
@@ -81,6 +94,8 @@ LiveSummary RunLiveSession(FramePump& frames,
     ++summary.num_frames;
     summary.num_read = frame->id.value + 1;
     progress.Step(summary.num_frames, {ToString(estimate.state)});
+    newest = std::chrono::steady_clock::now();
+    is_stalled = false;
   }
   summary.num_dropped = frames.num_dropped();
   progress.EndStage(Describe(summary));

@@ -31,6 +31,10 @@ using Bytes = std::vector<unsigned char>;
 // No image of a stream is larger.
 constexpr std::size_t kMaxImageBytes = 200U << 20U;
 constexpr int kPollMs = 50;
+// An address that answers nothing for so long when it is opened, or gives no frame for so long, has
+// ended.
+constexpr int kOpenTimeoutMs = 8'000;
+constexpr int kReadTimeoutMs = 20'000;
 
 std::string NumberedName(int number, const char* extension) {
   std::array<char, 32> name = {};
@@ -225,9 +229,16 @@ FramePump::Source CaptureStream(const std::string& source,
     StreamFrames frames;
   };
   const bool is_device = source.rfind("/dev/", 0) == 0;
-  const auto state = std::make_shared<State>(
-      State{cv::VideoCapture(source, is_device ? cv::CAP_V4L2 : cv::CAP_FFMPEG),
-            StreamFrames(times, folder)});
+  const auto open = [&] {
+    if (is_device) return cv::VideoCapture(source, cv::CAP_V4L2);
+    return cv::VideoCapture(source,
+                            cv::CAP_FFMPEG,
+                            {cv::CAP_PROP_OPEN_TIMEOUT_MSEC,
+                             kOpenTimeoutMs,
+                             cv::CAP_PROP_READ_TIMEOUT_MSEC,
+                             kReadTimeoutMs});
+  };
+  const auto state = std::make_shared<State>(State{open(), StreamFrames(times, folder)});
   if (!state->capture.isOpened()) {
     throw std::runtime_error(source + ": cannot be opened: check the " +
                              (is_device ? "device and that nothing else uses it"

@@ -8,6 +8,7 @@
 
 #include "rotodom/types/ids.h"
 #include "rotodom/types/rotation.h"
+#include "rotodom/types/similarity.h"
 
 namespace rotslam {
 
@@ -19,6 +20,8 @@ struct LiveKeyframe {
   // Part of the map that it belongs to. The scale of a part against the one before is a guess:
   // nothing that both see has a depth.
   int part = 0;
+  // What loops have multiplied distances around it by since it was added.
+  double scale = 1.0;
 };
 
 struct LivePoint {
@@ -30,13 +33,17 @@ struct LivePoint {
 /// The map of a live session as it stood once. It never changes; later ones have other objects.
 struct LiveMap {
   int revision = 0;  // counts the maps, from 1
-  // Times that keyframes of long ago have moved, too: 0, since LiveSlam moves them at the end only.
+  // Times that loops have moved all of it, and how these have moved what lies around the newest
+  // keyframe.
   int num_corrections = 0;
+  Similarity moved;
   std::vector<LiveKeyframe> keyframes;  // by frame
   std::vector<LivePoint> points;        // by track
 
   /// The newest keyframe that has a position; null where there is none.
   const LiveKeyframe* Newest() const { return keyframes.empty() ? nullptr : &keyframes.back(); }
+  /// The newest keyframe up to `frame`; the first one where there is none.
+  const LiveKeyframe* KeyframeAt(FrameId frame) const;
   /// Null where the map has no such point.
   const LivePoint* FindPoint(TrackId track) const;
 };

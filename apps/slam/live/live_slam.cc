@@ -23,7 +23,10 @@ constexpr int kRecentFrames = 40;
 
 // Keyframes whose orientations by the odometry go to the map with a new one: those that it has not
 // settled yet, and those of a part that is built anew.
-constexpr int kSentKeyframes = 16;
+constexpr std::ptrdiff_t kSentKeyframes = 16;
+
+// Keyframes on either side of a place that loops find whose observations tie the map to it.
+constexpr std::ptrdiff_t kPlaceKeyframes = 2;
 
 // Orientations against a keyframe are known no better.
 constexpr double kLeastSigma = 0.03 * kRadFromDeg;
@@ -33,6 +36,9 @@ constexpr double kStartParallax = 0.15;
 
 // Orientations as emitted follow the map in so long, s.
 constexpr double kFollowTime = 1.0;
+
+// Frames of before the map that are placed with one new frame; each costs a millisecond or two.
+constexpr int kLatePoses = 2;
 
 // Velocity is that over so long, s. Without points a position is carried on with it for as long;
 // then there is none.
@@ -99,7 +105,16 @@ LiveEstimate LiveSlam::AddFrame(double timestamp_s, const cv::Mat& image, const 
   frame.name = name;
   frame.image = working_.Reduced(image);
   const Candidate candidate = {frame.id, timestamp_s};
+  const std::size_t num_edges = odometry().edge_matches.size();
   TrackedFrame tracked = collector_.Track(std::move(frame));
+  if (live_.correct_map) {
+    has_loops_ = has_loops_ || tracked.estimate.has_averaged;
+    if (std::any_of(tracked.estimate.loops.begin(),
+                    tracked.estimate.loops.end(),
+                    [](const LoopCheck& loop) { return loop.accepted; })) {
+      NoteLoops(num_edges);
+    }
+  }
   LiveEstimate estimate;
   estimate.frame = candidate.frame;
   estimate.timestamp_s = timestamp_s;
@@ -107,6 +122,7 @@ LiveEstimate LiveSlam::AddFrame(double timestamp_s, const cv::Mat& image, const 
   estimate.covariance = tracked.estimate.covariance;
   {
     std::shared_ptr<const LiveMap> map = mapping_.TakeDue(timestamp_s);
+    if (map) FollowCorrection(*map);
     const std::lock_guard lock(mutex_);
     map_ = std::move(map);
   }
@@ -121,7 +137,10 @@ LiveEstimate LiveSlam::AddFrame(double timestamp_s, const cv::Mat& image, const 
       is_global_shutter ? (has_features ? std::optional(candidate) : std::nullopt) : newest_;
   if (asked) ChooseKeyframe(*asked, timestamp_s);
   newest_ = has_features ? std::optional(candidate) : std::nullopt;
+  if (has_loops_ && !collector_.is_averaging()) PostLoops(timestamp_s);
   UpdateVelocity(estimate);
+  NotePath(estimate);
+  PlaceEarlierFrames();
   last_ = estimate;
   SlamObserver nobody;
   if (const auto found = collector_.Take(std::move(tracked), nobody); found && !found_) {
@@ -194,6 +213,72 @@ void LiveSlam::Place(const Features& features, LiveEstimate& estimate) {
   estimate.center_in_world = start.center_in_world;
 }
 
+void LiveSlam::NotePath(const LiveEstimate& estimate) {
+  PathFrame& frame = path_.emplace_back();
+  frame.timestamp_s = estimate.timestamp_s;
+  if (!estimate.center_in_world) unplaced_.push_back(estimate.frame);
+  if (!map_) return;
+  const LiveKeyframe& keyframe = *map_->Newest();
+  frame.keyframe = keyframe.frame;
+  frame.scale = keyframe.scale;
+  frame.cam_from_keyframe = estimate.cam_from_world * keyframe.cam_from_world.Inverse();
+  if (!estimate.center_in_world) return;
+  frame.center_in_keyframe =
+      keyframe.cam_from_world * (*estimate.center_in_world - keyframe.center_in_world);
+}
+
+void LiveSlam::PlaceEarlierFrames() {
+  for (int k = 0; k < kLatePoses && !unplaced_.empty(); ++k) {
+    const FrameId frame = unplaced_.front();
+    if (!map_ || map_->Newest()->frame < frame) return;
+    unplaced_.pop_front();
+    const auto features = odometry().features.find(frame);
+    if (features == odometry().features.end()) continue;
+    // The map has begun with the next keyframe, or has the one before.
+    const LiveKeyframe& keyframe = *map_->KeyframeAt(frame);
+    const RotationMap& rotations = odometry().cam_from_world;
+    const Rotation cam_from_keyframe = rotations.at(frame) * rotations.at(keyframe.frame).Inverse();
+    ResectionStart start;
+    start.cam_from_world = cam_from_keyframe * keyframe.cam_from_world;
+    start.center_in_world = keyframe.center_in_world;
+    start.rotation_covariance = kLeastSigma * kLeastSigma * Eigen::Matrix3d::Identity();
+    const auto pose =
+        FindLivePose(*map_, features->second, start, collector_.camera(), options_.resection);
+    if (!pose) continue;
+    PathFrame& placed = path_[frame.value];
+    placed.keyframe = keyframe.frame;
+    placed.scale = keyframe.scale;
+    placed.cam_from_keyframe = pose->cam_from_world * keyframe.cam_from_world.Inverse();
+    placed.center_in_keyframe =
+        keyframe.cam_from_world * (pose->center_in_world - keyframe.center_in_world);
+  }
+}
+
+std::vector<LivePathPose> LiveSlam::Path() const {
+  std::vector<LivePathPose> path;
+  if (!map_) return path;
+  const RotationMap& rotations = odometry().cam_from_world;
+  for (std::size_t k = 0; k < path_.size(); ++k) {
+    const PathFrame& frame = path_[k];
+    const FrameId id{static_cast<int>(k)};
+    LivePathPose& pose = path.emplace_back();
+    pose.frame = id;
+    pose.timestamp_s = frame.timestamp_s;
+    const LiveKeyframe& keyframe = *map_->KeyframeAt(frame.keyframe.value_or(id));
+    if (!frame.keyframe || keyframe.frame != *frame.keyframe) {
+      pose.cam_from_world =
+          rotations.at(id) * rotations.at(keyframe.frame).Inverse() * keyframe.cam_from_world;
+      continue;
+    }
+    pose.cam_from_world = frame.cam_from_keyframe * keyframe.cam_from_world;
+    if (!frame.center_in_keyframe) continue;
+    pose.center_in_world = keyframe.center_in_world +
+                           keyframe.scale / frame.scale *
+                               (keyframe.cam_from_world.Inverse() * *frame.center_in_keyframe);
+  }
+  return path;
+}
+
 void LiveSlam::SetState(LiveEstimate& estimate) const {
   if (rotation_) {
     const bool is_still =
@@ -248,8 +333,9 @@ void LiveSlam::AddKeyframe(const Candidate& frame, double now_s) {
   input.frame = frame.frame;
   input.timestamp_s = frame.timestamp_s;
   keyframes_.push_back(frame.frame);
-  if (std::ssize(keyframes_) > kSentKeyframes) keyframes_.pop_front();
-  for (const FrameId keyframe : keyframes_) {
+  const auto num_sent = std::min(std::ssize(keyframes_), kSentKeyframes);
+  for (auto entry = keyframes_.end() - num_sent; entry != keyframes_.end(); ++entry) {
+    const FrameId keyframe = *entry;
     input.cam_from_world[keyframe] = odometry().cam_from_world.at(keyframe);
     const auto covariance = odometry().covariance.find(keyframe);
     if (covariance == odometry().covariance.end()) continue;
@@ -259,6 +345,76 @@ void LiveSlam::AddKeyframe(const Candidate& frame, double now_s) {
   input.features = odometry().features.at(frame.frame);
   mapping_.Post(std::move(input), now_s + live_.handover_s);
   keyframe_ = frame;
+}
+
+void LiveSlam::FollowCorrection(const LiveMap& map) {
+  if (!map_ || map.num_corrections == map_->num_corrections) return;
+  const Similarity move = map.moved * map_->moved.Inverse();
+  const Rotation turn = move.turn;
+  if (last_ && last_->map_revision > 0) {
+    last_->cam_from_world = move.Move(last_->cam_from_world);
+    if (last_->center_in_world) last_->center_in_world = move.Move(*last_->center_in_world);
+  }
+  for (StampedPose& pose : placed_) {
+    pose.world_from_cam = turn * pose.world_from_cam;
+    pose.center_in_world = move.Move(pose.center_in_world);
+  }
+  velocity_ = move.scale * (turn * velocity_);
+}
+
+FrameId LiveSlam::KeyframeNearest(FrameId frame) const {
+  const auto after = std::lower_bound(keyframes_.begin(), keyframes_.end(), frame);
+  if (after == keyframes_.begin()) return *after;
+  const auto before = std::prev(after);
+  const bool is_nearer =
+      after == keyframes_.end() || frame.value - before->value <= after->value - frame.value;
+  return is_nearer ? *before : *after;
+}
+
+void LiveSlam::NoteLoops(std::size_t first_edge) {
+  has_loops_ = true;
+  if (keyframes_.empty()) return;
+  const std::vector<EdgeMatches>& edges = odometry().edge_matches;
+  for (std::size_t k = first_edge; k < edges.size(); ++k) {
+    const EdgeMatches& edge = edges[k];
+    const Features& older = odometry().features.at(edge.frame_i);
+    const Features& newer = odometry().features.at(edge.frame_j);
+    RevisitedPlace place;
+    place.older = KeyframeNearest(edge.frame_i);
+    std::map<TrackId, std::size_t> index;
+    for (const auto& [i, j] : edge.pairs) {
+      // The other edges follow tracks.
+      if (older.tracks[i] == newer.tracks[j] || index.contains(older.tracks[i])) continue;
+      index[older.tracks[i]] = place.points.size();
+      place.points.push_back({older.tracks[i], newer.tracks[j], {}});
+    }
+    if (place.points.empty()) continue;
+    // Where the keyframes around the older place see them.
+    const auto nearest = std::lower_bound(keyframes_.begin(), keyframes_.end(), place.older);
+    const auto num_before = std::min(std::distance(keyframes_.begin(), nearest), kPlaceKeyframes);
+    const auto num_after = std::min(std::distance(nearest, keyframes_.end()), kPlaceKeyframes + 1);
+    for (auto keyframe = nearest - num_before; keyframe != nearest + num_after; ++keyframe) {
+      const Features& features = odometry().features.at(*keyframe);
+      for (int n = 0; n < features.size(); ++n) {
+        const auto point = index.find(features.tracks[n]);
+        if (point == index.end()) continue;
+        place.points[point->second].observations.push_back(
+            {*keyframe, features.keypoints_px[n], features.bearings[n]});
+      }
+    }
+    revisited_.push_back(std::move(place));
+  }
+}
+
+void LiveSlam::PostLoops(double now_s) {
+  LoopInput input;
+  for (const FrameId keyframe : keyframes_) {
+    input.cam_from_world[keyframe] = odometry().cam_from_world.at(keyframe);
+  }
+  input.places = std::move(revisited_);
+  revisited_.clear();
+  has_loops_ = false;
+  mapping_.Post(std::move(input), now_s + live_.handover_s);
 }
 
 std::vector<Eigen::Vector2d> LiveSlam::SeenPointsPx() const {

@@ -45,11 +45,21 @@ struct LiveEstimate {
   int map_revision = 0;  // 0: there is no map
 };
 
+/// Pose of a frame as the newest map has it.
+struct LivePathPose {
+  FrameId frame;
+  double timestamp_s = 0.0;
+  Rotation cam_from_world;
+  std::optional<Eigen::Vector3d> center_in_world;  // nullopt where no map reaches
+};
+
 /// Of a live session, beside those of the system.
 struct LiveOptions {
   // The map of a keyframe is used from frames on that are so much later, s. Less brings new points
   // sooner; more leaves a slow machine more time before a frame has to wait for the map.
   double handover_s = 0.2;
+  // Loops move the map. Off: they turn orientations alone until the session ends.
+  bool correct_map = true;
 };
 
 /// The whole system while the camera runs: a pose for every frame at once, and a map that grows on
@@ -76,6 +86,11 @@ class LiveSlam {
   /// The map that the newest pose refers to; null where there is none. It may be called from any
   /// thread at any time.
   std::shared_ptr<const LiveMap> Map() const;
+
+  /// All frames so far in the newest map; empty while there is none. Loops have moved them, and
+  /// frames that came before the map began have a position where it has points that they see. Call
+  /// it from the thread that adds frames.
+  std::vector<LivePathPose> Path() const;
 
   /// Finishes the session: the result is that of RunSlam for the same frames. No frame may be added
   /// afterwards.
@@ -104,11 +119,29 @@ class LiveSlam {
     double timestamp_s = 0.0;
   };
 
+  // A frame against a keyframe of the map.
+  struct PathFrame {
+    double timestamp_s = 0.0;
+    std::optional<FrameId> keyframe;  // nullopt: there was no map
+    double scale = 1.0;               // of that keyframe at that time
+    Rotation cam_from_keyframe;
+    std::optional<Eigen::Vector3d> center_in_keyframe;  // in its camera frame
+  };
+
   void Place(const Features& features, LiveEstimate& estimate);
+  void NotePath(const LiveEstimate& estimate);
+  // Finds positions of a few frames that came before the map did.
+  void PlaceEarlierFrames();
   void UpdateVelocity(const LiveEstimate& estimate);
   void SetState(LiveEstimate& estimate) const;
   void ChooseKeyframe(const Candidate& frame, double now_s);
   void AddKeyframe(const Candidate& frame, double now_s);
+  // Goes on from a map that loops have moved.
+  void FollowCorrection(const LiveMap& map);
+  // Takes what the newest frame's loops have matched, edges from `first_edge` on.
+  void NoteLoops(std::size_t first_edge);
+  FrameId KeyframeNearest(FrameId frame) const;
+  void PostLoops(double now_s);
   ViewOverlap OverlapWithKeyframe(FrameId frame) const;
   std::vector<TrackRay> RaysOf(FrameId frame) const;
   const OdometryResult& odometry() const { return collector_.odometry(); }
@@ -125,12 +158,16 @@ class LiveSlam {
   int num_frames_ = 0;
 
   std::optional<Candidate> keyframe_;  // the newest one
-  std::deque<FrameId> keyframes_;      // the newest ones
-  std::optional<Candidate> before_;    // was asked before the newest one whether it is a keyframe
-  std::optional<Candidate> newest_;    // the newest frame, where it has features
+  std::vector<FrameId> keyframes_;
+  std::vector<RevisitedPlace> revisited_;  // by loops that the map does not know of
+  bool has_loops_ = false;                 // orientations have moved, or are about to
+  std::optional<Candidate> before_;  // was asked before the newest one whether it is a keyframe
+  std::optional<Candidate> newest_;  // the newest frame, where it has features
   std::optional<PureRotationSegment> rotation_;  // that the newest frame is in
   std::optional<LiveEstimate> last_;
-  std::deque<StampedPose> placed_;                      // of late, by the map
+  std::vector<PathFrame> path_;     // by frame
+  std::deque<FrameId> unplaced_;    // frames without a position that the map has not reached yet
+  std::deque<StampedPose> placed_;  // of late, by the map
   Eigen::Vector3d velocity_ = Eigen::Vector3d::Zero();  // per second
 
   mutable std::mutex mutex_;  // of the map

@@ -5,7 +5,25 @@
 
 #include "rotodom/types/stopwatch.h"
 
+#ifdef __linux__
+#include <sys/resource.h>
+#include <unistd.h>
+#endif
+
 namespace rotslam {
+namespace {
+
+// Frames come first: where the cores do not suffice for both, the map takes what frames leave.
+void LowerPriority() {
+#ifdef __linux__
+  // Of this thread, as only Linux has it. Failure does no harm.
+  constexpr int kSteps = 5;
+  const int priority = getpriority(PRIO_PROCESS, static_cast<id_t>(gettid()));
+  setpriority(PRIO_PROCESS, static_cast<id_t>(gettid()), priority + kSteps);
+#endif
+}
+
+}  // namespace
 
 MapThread::MapThread(const Camera& camera, const SlamOptions& options)
     : mapper_(camera, options), thread_([this] { Work(); }) {}
@@ -19,7 +37,7 @@ MapThread::~MapThread() {
   thread_.join();
 }
 
-void MapThread::Post(KeyframeInput input, double due_s) {
+void MapThread::Post(std::variant<KeyframeInput, LoopInput> input, double due_s) {
   due_s_.push_back(due_s_.empty() ? due_s : std::max(due_s, due_s_.back()));
   {
     const std::lock_guard lock(mutex_);
@@ -43,8 +61,9 @@ std::shared_ptr<const LiveMap> MapThread::TakeDue(double now_s) {
 }
 
 void MapThread::Work() {
+  LowerPriority();
   while (true) {
-    KeyframeInput input;
+    std::variant<KeyframeInput, LoopInput> input;
     {
       std::unique_lock lock(mutex_);
       changed_.wait(lock, [this] { return is_over_ || !jobs_.empty(); });
@@ -54,7 +73,9 @@ void MapThread::Work() {
     }
     Done done;
     try {
-      done.map = mapper_.AddKeyframe(input);
+      const auto* keyframe = std::get_if<KeyframeInput>(&input);
+      done.map = keyframe != nullptr ? mapper_.AddKeyframe(*keyframe)
+                                     : mapper_.CloseLoops(std::get<LoopInput>(input));
     } catch (...) {
       done.problem = std::current_exception();
     }

@@ -6,6 +6,7 @@
 #include <memory>
 #include <mutex>
 #include <thread>
+#include <variant>
 
 #include "apps/slam/live/live_mapper.h"
 
@@ -22,8 +23,9 @@ class MapThread {
   MapThread(const MapThread&) = delete;
   MapThread& operator=(const MapThread&) = delete;
 
-  /// Gives a keyframe, whose map is due at `due_s`, not before that of the keyframe before.
-  void Post(KeyframeInput input, double due_s);
+  /// Gives a keyframe, or what loops bring. Its map is due at `due_s`, not before that of what was
+  /// given before.
+  void Post(std::variant<KeyframeInput, LoopInput> input, double due_s);
 
   /// The newest map that is due by `now_s`, waiting for it where it is not ready; null where there
   /// is none. Throws what the mapper has thrown.
@@ -43,8 +45,8 @@ class MapThread {
   LiveMapper mapper_;
   std::mutex mutex_;  // of what follows, up to the thread
   std::condition_variable changed_;
-  std::deque<KeyframeInput> jobs_;  // not begun
-  std::deque<Done> done_;           // not taken, oldest first
+  std::deque<std::variant<KeyframeInput, LoopInput>> jobs_;  // not begun
+  std::deque<Done> done_;                                    // not taken, oldest first
   bool is_over_ = false;
   // Of the caller's thread.
   std::deque<double> due_s_;  // of everything given and not taken, oldest first

@@ -1,5 +1,7 @@
+#include <atomic>
 #include <filesystem>
 #include <string>
+#include <thread>
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -47,6 +49,23 @@ TEST_F(LiveTest, EndsWithTheResultOfRunAlsoWhereFramesWereLeftOut) {
       EXPECT_TRUE(ReadWholeFile(Out() / file) == ReadWholeFile(run / file)) << flag << file;
     }
   }
+}
+
+// Poses as emitted are the same bytes where another program keeps the other core busy.
+TEST_F(LiveTest, EmitsTheSameBytesOnABusyMachine) {
+  ASSERT_EQ(LiveFromPipe("--wait").exit_code, 0);
+  const std::string expected = ReadWholeFile(Out() / "live_trajectory_tum.txt");
+  ASSERT_GT(expected.size(), 500U);
+  std::atomic<bool> is_over = false;
+  std::thread other([&] {
+    while (!is_over) {
+    }
+  });
+  const CommandResult busy = LiveFromPipe("--wait");
+  is_over = true;
+  other.join();
+  ASSERT_EQ(busy.exit_code, 0) << busy.error;
+  EXPECT_TRUE(ReadWholeFile(Out() / "live_trajectory_tum.txt") == expected);
 }
 
 TEST_F(LiveTest, RefusesWhatItCannotDo) {

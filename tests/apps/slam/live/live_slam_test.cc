@@ -1,5 +1,6 @@
 #include "apps/slam/live/live_slam.h"
 
+#include <algorithm>
 #include <chrono>
 #include <cmath>
 #include <optional>
@@ -178,6 +179,19 @@ TEST(LiveSlam, HoldsThePositionWhileTheCameraTurns) {
     EXPECT_EQ(estimate.center_in_world, held);
   }
   EXPECT_GT(num_held, 30);  // of 48
+  // Frames behind the turn had no position until the map went on there; afterwards they have one.
+  const std::vector<LivePathPose> path = slam.Path();
+  ASSERT_EQ(path.size(), estimates.size());
+  int num_late = 0;
+  for (std::size_t k = 70; k < path.size(); ++k) {
+    if (!estimates[k].center_in_world) num_late += path[k].center_in_world ? 1 : 0;
+  }
+  const auto num_without =
+      std::count_if(estimates.begin() + 70, estimates.end(), [](const LiveEstimate& estimate) {
+        return estimate.state == LiveState::kStarting;
+      });
+  EXPECT_GT(num_without, 0);
+  EXPECT_GE(num_late, num_without / 2);
   // The map goes on behind it, in a part of its own.
   EXPECT_EQ(estimates.back().state, LiveState::kTracking);
   EXPECT_EQ(slam.Map()->keyframes.back().part, 1);
