@@ -351,9 +351,9 @@ void LiveSlam::FollowCorrection(const LiveMap& map) {
   if (!map_ || map.num_corrections == map_->num_corrections) return;
   const Similarity move = map.moved * map_->moved.Inverse();
   const Rotation turn = move.turn;
-  if (last_ && last_->map_revision > 0) {
-    last_->cam_from_world = move.Move(last_->cam_from_world);
-    if (last_->center_in_world) last_->center_in_world = move.Move(*last_->center_in_world);
+  // The position moves with the map. The orientation follows it as always, without a jump.
+  if (last_ && last_->center_in_world) {
+    last_->center_in_world = move.Move(*last_->center_in_world);
   }
   for (StampedPose& pose : placed_) {
     pose.world_from_cam = turn * pose.world_from_cam;
