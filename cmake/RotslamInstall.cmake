@@ -13,7 +13,7 @@ endforeach()
 # Static libraries: who links them needs what they use, also where no header of ours shows it.
 file(CONFIGURE OUTPUT ${PROJECT_BINARY_DIR}/rotslamConfig.cmake @ONLY CONTENT [[
 include(CMakeFindDependencyMacro)
-find_dependency(Eigen3 3.4 NO_MODULE)
+find_dependency(Eigen3 NO_MODULE)
 find_dependency(Threads)
 find_dependency(OpenCV 4.5)
 find_dependency(yaml-cpp)
@@ -27,6 +27,7 @@ list(POP_FRONT CMAKE_MODULE_PATH)
 find_dependency(PkgConfig)
 pkg_check_modules(CLP REQUIRED IMPORTED_TARGET clp)
 pkg_check_modules(FFMPEG REQUIRED IMPORTED_TARGET libavformat libavcodec libavutil libswscale)
+include("${CMAKE_CURRENT_LIST_DIR}/RotslamPackageNames.cmake")
 include("${CMAKE_CURRENT_LIST_DIR}/rotslamTargets.cmake")
 ]])
 write_basic_package_version_file(${PROJECT_BINARY_DIR}/rotslamConfigVersion.cmake COMPATIBILITY SameMinorVersion)
@@ -35,4 +36,5 @@ install(
     ${PROJECT_BINARY_DIR}/rotslamConfig.cmake
     ${PROJECT_BINARY_DIR}/rotslamConfigVersion.cmake
     ${PROJECT_SOURCE_DIR}/cmake/FindPclIo.cmake
+    ${PROJECT_SOURCE_DIR}/cmake/RotslamPackageNames.cmake
   DESTINATION ${CMAKE_INSTALL_LIBDIR}/cmake/rotslam)

@@ -1,8 +1,9 @@
 #!/usr/bin/env bash
 # Installs the Debian packages that rotslam needs and that are missing; the only list of them.
-#   scripts/install_packages.sh          what building, running and testing takes
-#   scripts/install_packages.sh --ci     and what only continuous integration takes
-#   scripts/install_packages.sh --fuzz   and what only scripts/fuzz.sh takes
+#   scripts/install_packages.sh            what building, running and testing takes
+#   scripts/install_packages.sh --ci       and what only continuous integration takes
+#   scripts/install_packages.sh --fuzz     and what only scripts/fuzz.sh takes
+#   scripts/install_packages.sh --package  and what only scripts/package.sh takes
 # Works as root or through sudo; asks the network for nothing when all is there.
 set -euo pipefail
 
@@ -34,8 +35,10 @@ if [[ ${1:-} == --ci ]]; then
 elif [[ ${1:-} == --fuzz ]]; then
   # llvm: its symbolizer, which gives stack traces names
   packages+=(clang-14 libclang-rt-14-dev llvm-14)
+elif [[ ${1:-} == --package ]]; then
+  packages+=(dpkg-dev file)
 elif [[ $# -gt 0 ]]; then
-  echo "usage: ${0##*/} [--ci|--fuzz]" >&2
+  echo "usage: ${0##*/} [--ci|--fuzz|--package]" >&2
   exit 2
 fi
 

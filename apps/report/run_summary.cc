@@ -5,6 +5,7 @@
 #include <limits>
 #include <stdexcept>
 #include <system_error>
+#include <utility>
 
 namespace rotslam {
 namespace {
@@ -44,7 +45,7 @@ std::optional<Json> ReadJsonObject(const std::filesystem::path& path) {
   if (!file) return std::nullopt;
   Json json = Json::parse(file, keep, false);
   if (is_deep || !json.is_object()) return std::nullopt;
-  return json;
+  return std::make_optional<Json>(std::move(json));
 }
 
 Json ReadSummaryOf(const std::filesystem::path& run) {

@@ -217,6 +217,44 @@ TEST_F(ImagesTest, OfAnOlderRunAreNotCompared) {
   EXPECT_THAT(result.error, HasSubstr("has no matches.bin, an older version has written it"));
 }
 
+// Version 0.1.0 left fewer files and maps of format 2, which tests/output/map/run_map_test.cc
+// reads.
+TEST_F(ExportTest, RunsOfVersion010AreExported) {
+  const fs::path run = folder_.path() / "run_of_0.1.0";
+  fs::copy(RunFolder(), run, fs::copy_options::recursive);
+  for (const char* newer : {"matches.bin", "thumbnails.bin", "poses.csv", "camera.yaml"}) {
+    EXPECT_TRUE(fs::remove(run / newer)) << newer;
+  }
+  for (const char* map : {"map.bin", "map_all_frames.bin"}) {
+    std::string bytes = ReadWholeFile(run / map);
+    ASSERT_EQ(bytes.substr(0, 14), "rotslam_map 3\n");
+    bytes.erase(14 + 3 * 4 + 9 * 8, 3 * 8);  // the last three of eight coefficients
+    bytes[12] = '2';
+    std::ofstream(run / map, std::ios::binary) << bytes;
+  }
+  for (const std::string format : {"colmap",
+                                   "colmap-db",
+                                   "csv",
+                                   "euroc",
+                                   "g2o",
+                                   "kitti",
+                                   "nerf",
+                                   "nerfstudio",
+                                   "openmvg",
+                                   "ply",
+                                   "stella",
+                                   "tum"}) {
+    const fs::path out = folder_.path() / "of_0.1.0" / format;
+    const CommandResult result =
+        Rotslam({"export", run.string(), "--to", format, "--out", out.string()});
+    EXPECT_EQ(result.exit_code, 0) << format << ": " << result.error;
+    EXPECT_TRUE(fs::exists(out)) << format;
+    // Without the matches that became no tracks, and without notes on the poses.
+    if (format.starts_with("colmap") || format == "csv" || !fs::is_regular_file(out)) continue;
+    EXPECT_EQ(ReadWholeFile(out), ReadWholeFile(Export(format))) << format;
+  }
+}
+
 TEST_F(ImagesTest, OfAVideoAreTheFramesThatWereRead) {
   const fs::path video = folder_.path() / "video.avi";
   {
