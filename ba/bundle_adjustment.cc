@@ -11,7 +11,6 @@
 #include "ba/outliers/classification.h"
 #include "ba/problem/bundle_state.h"
 #include "ba/solver/minimisation.h"
-#include "ba/triangulation_in_place.h"
 #include "rotodom/camera/lens_parameters.h"
 #include "rotodom/types/splitmix64.h"
 #include "rotodom/types/stopwatch.h"
@@ -382,7 +381,7 @@ BundleResult RefineBundle(const BundleProblem& problem,
   return result;
 }
 
-Reconstruction TriangulateInPlace(BundleProblem problem, const BundleOptions& options) {
+Reconstruction TriangulateTracks(BundleProblem problem, const BundleOptions& options) {
   BundleState state = MakeBundleState(problem, options);
   for (TrackState& entry : state.tracks) {
     const auto known = problem.start.point_in_world.find(entry.track->id);
@@ -411,17 +410,7 @@ Reconstruction TriangulateInPlace(BundleProblem problem, const BundleOptions& op
   return map;
 }
 
-Reconstruction TriangulateTracks(const BundleProblem& problem, const BundleOptions& options) {
-  return TriangulateInPlace(problem, options);
-}
-
-Reconstruction WithoutShallowPoints(const Reconstruction& reconstruction, double min_angle_deg) {
-  Reconstruction deep = reconstruction;
-  DropShallowPoints(min_angle_deg, deep);
-  return deep;
-}
-
-void DropShallowPoints(double min_angle_deg, Reconstruction& reconstruction) {
+Reconstruction WithoutShallowPoints(Reconstruction reconstruction, double min_angle_deg) {
   std::vector<PosedRay> rays;
   std::erase_if(reconstruction.tracks, [&](const Track& track) {
     const auto point = reconstruction.point_in_world.find(track.id);
@@ -443,6 +432,7 @@ void DropShallowPoints(double min_angle_deg, Reconstruction& reconstruction) {
     kept.insert(*reconstruction.point_in_world.find(track.id));
   }
   reconstruction.point_in_world = std::move(kept);
+  return reconstruction;
 }
 
 }  // namespace rotslam

@@ -43,13 +43,15 @@ BundleResult RefineBundle(const BundleProblem& problem,
 
 /// Triangulates all tracks of `problem` against its cameras, which stay as they are, and keeps the
 /// observations within `options.fine.max_error_px`: more points, seen from more frames, for a
-/// cloud.
+/// cloud. Points of the start are where theirs are looked for first.
+/// Memory:  that of `problem`, when it is moved in; of a long sequence its tracks are most of what
+///          is kept.
 /// @return  the poses of the start with those points and tracks; the same contract as RefineBundle.
-Reconstruction TriangulateTracks(const BundleProblem& problem, const BundleOptions& options);
+Reconstruction TriangulateTracks(BundleProblem problem, const BundleOptions& options);
 
 /// The reconstruction without the points (and their tracks) whose rays nowhere meet at
 /// `min_angle_deg`. Shallow points help rotations but spread along the line of sight, which is not
 /// what one wants to look at.
-Reconstruction WithoutShallowPoints(const Reconstruction& reconstruction, double min_angle_deg);
+Reconstruction WithoutShallowPoints(Reconstruction reconstruction, double min_angle_deg);
 
 }  // namespace rotslam

@@ -15,7 +15,7 @@
 #include "apps/slam/map/stated_sigmas.h"
 #include "apps/slam/map_correction/map_correction.h"
 #include "apps/slam/map_views.h"
-#include "ba/triangulation_in_place.h"
+#include "ba/bundle_adjustment.h"
 #include "rotodom/averaging/anchors.h"
 #include "rotodom/averaging/global_averaging.h"
 #include "rotodom/motion_blur/keypoint_blur.h"
@@ -538,15 +538,15 @@ void MakeCloud(std::vector<Track> all_tracks,
   observer.OnBegin(SlamStage::kCloud, -1);
   BundleOptions bundle_options = options.ba;
   bundle_options.num_threads = options.num_threads;
-  result.cloud = MakeCloudInPlace({result.camera,
-                                   result.cam_from_world,
-                                   result.center_in_world,
-                                   result.map.point_in_world,
-                                   result.segments},
-                                  std::move(all_tracks),
-                                  bundle_options);
+  result.cloud = MakeCloudOf({result.camera,
+                              result.cam_from_world,
+                              result.center_in_world,
+                              result.map.point_in_world,
+                              result.segments},
+                             std::move(all_tracks),
+                             bundle_options);
   const auto num_points = result.cloud.point_in_world.size();
-  DropShallowPoints(options.cloud_min_angle_deg, result.cloud);
+  result.cloud = WithoutShallowPoints(std::move(result.cloud), options.cloud_min_angle_deg);
   result.num_shallow_points = static_cast<int>(num_points - result.cloud.point_in_world.size());
   PointMap rest = WithoutOutliers(result.cloud.point_in_world, options.cloud_outliers);
   result.num_cloud_outliers = static_cast<int>(result.cloud.point_in_world.size() - rest.size());

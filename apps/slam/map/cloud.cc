@@ -2,19 +2,13 @@
 
 #include <utility>
 
-#include "ba/triangulation_in_place.h"
+#include "ba/bundle_adjustment.h"
 
 namespace rotslam {
 
 Reconstruction MakeCloudOf(const CloudSources& sources,
-                           const std::vector<Track>& tracks,
+                           std::vector<Track> tracks,
                            const BundleOptions& options) {
-  return MakeCloudInPlace(sources, tracks, options);
-}
-
-Reconstruction MakeCloudInPlace(const CloudSources& sources,
-                                std::vector<Track> tracks,
-                                const BundleOptions& options) {
   BundleProblem problem;
   problem.camera = sources.camera;
   problem.start.cam_from_world = sources.cam_from_world;
@@ -30,7 +24,7 @@ Reconstruction MakeCloudInPlace(const CloudSources& sources,
         problem.shared_center[frame] = segment.first;
     }
   }
-  return TriangulateInPlace(std::move(problem), options);
+  return TriangulateTracks(std::move(problem), options);
 }
 
 }  // namespace rotslam

@@ -21,14 +21,9 @@ struct CloudSources {
 };
 
 /// Triangulates the points of all tracks, not only those of the keyframes, from the poses of all
-/// frames.
+/// frames; in the memory of `tracks`, when they are moved in.
 Reconstruction MakeCloudOf(const CloudSources& sources,
-                           const std::vector<Track>& tracks,
+                           std::vector<Track> tracks,
                            const BundleOptions& options);
-
-/// The same in the memory of `tracks`.
-Reconstruction MakeCloudInPlace(const CloudSources& sources,
-                                std::vector<Track> tracks,
-                                const BundleOptions& options);
 
 }  // namespace rotslam
