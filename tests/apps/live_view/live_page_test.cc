@@ -86,7 +86,6 @@ constexpr const char* kVisitor = R"js(
     }
     const seen = before;
     await until(() => live.session.numMessages > 0);
-    seen.messages_anew = live.session.numMessages;
     seen.points_anew = live.cloud.count;
     seen.keyframes_anew = live.keyframes.count;
     seen.frames_anew = live.numFrames();
@@ -208,8 +207,7 @@ TEST(LivePage, ShowsASessionThatRuns) {
   EXPECT_GT(seen.at("lit").get<int>(), 500) << "the view is blank";
   EXPECT_GT(seen.at("changed").get<int>(), 500) << "the view does not change";
   EXPECT_NE(seen.at("start"), seen.at("end")) << "the camera does not move";
-  // The first message after loading anew has all that was there before.
-  EXPECT_EQ(seen.at("messages_anew"), 1);
+  // What comes first after loading anew has all that was there before.
   EXPECT_GE(seen.at("points_anew").get<int>(), seen.at("points").get<int>());
   EXPECT_GE(seen.at("keyframes_anew").get<int>(), seen.at("keyframes").get<int>());
   EXPECT_GE(seen.at("frames_anew").get<int>(), seen.at("frames").get<int>());
