@@ -21,8 +21,6 @@ namespace {
 constexpr double kInfinity = std::numeric_limits<double>::infinity();
 // Two-view hypotheses for a track in which not all observations agree.
 constexpr int kMaxTrackHypotheses = 20;
-// Rays that a point is triangulated from before its cost is minimised over all of them.
-constexpr std::size_t kMaxRays = 16;
 // Gauss-Newton steps of a point, and the share of its cost that is worth another.
 constexpr int kMaxSteps = 10;
 constexpr double kLeastGain = 1e-4;
@@ -236,20 +234,14 @@ class Classifier {
       if (!(sum.norm() > 0.0)) return std::nullopt;
       return sum.normalized();
     }
-    std::vector<std::size_t> seen;
-    seen.reserve(chosen.size());
-    for (std::size_t k = 0; k < chosen.size(); ++k) {
-      if (chosen[k]) seen.push_back(k);
-    }
-    if (seen.size() < 2) return std::nullopt;
-    // Of a long track some rays, from the first to the last, say where to start from.
-    const std::size_t count = std::min(seen.size(), kMaxRays);
     std::vector<PosedRay> rays;
-    rays.reserve(count);
-    for (std::size_t n = 0; n < count; ++n) {
-      const std::size_t k = seen[n * (seen.size() - 1) / (count - 1)];
-      rays.push_back(AsPosedRay(state_, track.observations[k], state_.camera.MeanFocal()));
+    rays.reserve(chosen.size());
+    for (std::size_t k = 0; k < chosen.size(); ++k) {
+      if (chosen[k]) {
+        rays.push_back(AsPosedRay(state_, track.observations[k], state_.camera.MeanFocal()));
+      }
     }
+    if (rays.size() < 2) return std::nullopt;
     return Triangulate(rays, min_angle_rad_);
   }
 
