@@ -24,6 +24,9 @@ enum class SlamStage {
   kCloud,              // points as all frames see them
 };
 
+/// The name of a stage in messages: "known rotation".
+const char* ToString(SlamStage stage);
+
 /// One frame of the first stage.
 struct FrameProgress {
   const Frame& frame;  // without its image

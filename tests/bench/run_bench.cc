@@ -131,26 +131,6 @@ class MeteredFrames final : public FrameSource {
   int num_read_again_ = 0;
 };
 
-const char* NameOf(SlamStage stage) {
-  switch (stage) {
-    case SlamStage::kOrientations:
-      return "orientations";
-    case SlamStage::kTracks:
-      return "tracks";
-    case SlamStage::kKnownRotation:
-      return "known rotation";
-    case SlamStage::kBundleAdjustment:
-      return "bundle adjustment";
-    case SlamStage::kPureRotation:
-      return "pure rotation";
-    case SlamStage::kFrameRegistration:
-      return "frames between keyframes";
-    case SlamStage::kCloud:
-      return "cloud";
-  }
-  return "";
-}
-
 // The time from the beginning of each stage to the next one's.
 class StageMeter final : public SlamObserver {
  public:
@@ -258,7 +238,7 @@ void PrintRun(const Flags& flags, int num_threads) {
                 100.0 * cost.processor_s / all.processor_s,
                 cost.count);
   };
-  for (const auto& [stage, cost] : stages.costs()) print(NameOf(stage), cost);
+  for (const auto& [stage, cost] : stages.costs()) print(ToString(stage), cost);
   print("of these: reading images", frames.next());
   print("of these: reading them again", frames.again());
   std::printf(

@@ -63,26 +63,6 @@ class SlamProgress::Counters {
 
 namespace {
 
-const char* NameOf(SlamStage stage) {
-  switch (stage) {
-    case SlamStage::kOrientations:
-      return "orientations";
-    case SlamStage::kTracks:
-      return "tracks";
-    case SlamStage::kKnownRotation:
-      return "known rotation";
-    case SlamStage::kBundleAdjustment:
-      return "bundle adjustment";
-    case SlamStage::kPureRotation:
-      return "pure rotation";
-    case SlamStage::kFrameRegistration:
-      return "frames between keyframes";
-    case SlamStage::kCloud:
-      return "cloud";
-  }
-  return "";
-}
-
 // "12, 40-52 and 3 more": the ranges of ids in a set, as many as a line has room for.
 std::string FrameRanges(const std::set<FrameId>& frames) {
   constexpr int kMaxNamedRanges = 6;  // fit a line of a terminal with the rest of the sentence
@@ -303,7 +283,7 @@ void SlamProgress::OnBegin(SlamStage stage, int num_steps) {
     num_announced_ = num_steps;
     counters_ = std::make_unique<Counters>(options_.pure_rotation_segments);
   }
-  progress_.StartStage(NameOf(stage), num_steps);
+  progress_.StartStage(ToString(stage), num_steps);
 }
 
 void SlamProgress::OnFrame(const FrameProgress& progress) {
