@@ -10,9 +10,10 @@
 #include <ClpSimplex.hpp>
 #include <CoinPackedMatrix.hpp>
 
+#include "rotodom/types/stopwatch.h"
+
 #ifdef ROTSLAM_WITH_GLPK
 #include "krot/lp/lp_glpk.h"
-#include "rotodom/types/stopwatch.h"
 #endif
 
 namespace rotslam {
