@@ -19,7 +19,7 @@ class ShownMap {
   /// Of larger maps only points whose track is a multiple of two, four, ... are shown.
   static constexpr std::size_t kMaxPoints = 100'000;
 
-  void Update(const LiveMap& map, double first_time_s);
+  void Update(const LiveMap& map);
 
   int version() const { return version_; }
   std::size_t num_points() const { return points_.size(); }
@@ -38,10 +38,8 @@ class ShownMap {
   };
   struct Keyframe {
     int frame = 0;
-    float time_s = 0.0F;  // since the first frame
     Eigen::Vector4f quaternion;
     Eigen::Vector3f position;
-    int part = 0;
     int changed = 0;
 
     bool IsSameAs(const Keyframe& other) const;
@@ -49,7 +47,7 @@ class ShownMap {
 
   void UpdatePoints(const std::vector<LivePoint>& points);
   void RemoveUnseenPoints();
-  void UpdateKeyframes(const std::vector<LiveKeyframe>& keyframes, double first_time_s);
+  void UpdateKeyframes(const std::vector<LiveKeyframe>& keyframes);
   nlohmann::ordered_json PointsAfter(int version) const;
   nlohmann::ordered_json KeyframesAfter(int version) const;
 

@@ -13,13 +13,13 @@
 namespace rotslam {
 namespace {
 
-// Weights of scale differences, against one of neighbours within a part.
-constexpr double kPartWeight = 1e-4;
+// Weights of scale differences, against one of neighbours within a component.
+constexpr double kComponentWeight = 1e-4;
 constexpr double kLinkWeight = 1e3;
 // A step is known to a share of its length; a link to this share of the median step.
 constexpr double kLinkShare = 0.1;
-// What a step is known to at least, as a share of the median one: a camera that turns in place
-// keeps its centre.
+// The least deviation of a step, as a share of the median step: a camera that only rotates keeps
+// its centre.
 constexpr double kLeastShare = 0.01;
 
 // value[j] - value[i] = difference, by a row each.
@@ -60,9 +60,14 @@ Rotation Mean(const std::vector<Rotation>& rotations, std::ptrdiff_t first, std:
 
 }  // namespace
 
-RotationMap BendTo(const RotationMap& averaged, const KeyframeChain& chain) {
+const Similarity& MoveAt(const KeyframeMoves& moves, FrameId frame) {
+  auto after = moves.upper_bound(frame);
+  return (after == moves.begin() ? after : std::prev(after))->second;
+}
+
+RotationMap FollowAveraged(const RotationMap& averaged, const KeyframeChain& chain) {
   // Neighbours on either side over which the difference is averaged: adjustment moves the newest
-  // keyframes by less than matches err, averaging bends over longer stretches.
+  // keyframes by less than matches err, averaging changes longer stretches.
   constexpr std::ptrdiff_t kNeighbours = 4;
   const auto& [first, begin] = *chain.begin();
   const Rotation averaged_from_world = averaged.at(first).Inverse() * begin.cam_from_world;
@@ -71,21 +76,21 @@ RotationMap BendTo(const RotationMap& averaged, const KeyframeChain& chain) {
     const Rotation cam_from_new_world = averaged.at(frame) * averaged_from_world;
     new_from_old_world.push_back(cam_from_new_world.Inverse() * keyframe.cam_from_world);
   }
-  RotationMap bent;
+  RotationMap followed;
   std::ptrdiff_t k = 0;
   for (const auto& [frame, keyframe] : chain) {
     const auto reach = std::min({kNeighbours, k, std::ssize(new_from_old_world) - 1 - k});
-    bent[frame] =
+    followed[frame] =
         keyframe.cam_from_world * Mean(new_from_old_world, k - reach, k + reach).Inverse();
     ++k;
   }
-  return bent;
+  return followed;
 }
 
-std::map<FrameId, Similarity> CloseLinks(const KeyframeChain& chain,
-                                         const RotationMap& cam_from_world,
-                                         std::span<const std::pair<FrameId, FrameId>> kept,
-                                         std::span<const PlaceLink> links) {
+KeyframeMoves CloseLinks(const KeyframeChain& chain,
+                         const RotationMap& cam_from_world,
+                         std::span<const std::pair<FrameId, FrameId>> kept,
+                         std::span<const PlaceLink> links) {
   const auto num_keyframes = static_cast<int>(chain.size());
   std::map<FrameId, int> index;
   std::vector<const ChainedKeyframe*> keyframes;
@@ -104,8 +109,8 @@ std::map<FrameId, Similarity> CloseLinks(const KeyframeChain& chain,
 
   std::vector<Difference> scales;
   for (int k = 1; k < num_keyframes; ++k) {
-    const bool is_joined = keyframes[k]->part == keyframes[k - 1]->part;
-    scales.push_back({k - 1, k, is_joined ? 1.0 : kPartWeight});
+    const bool is_joined = keyframes[k]->component == keyframes[k - 1]->component;
+    scales.push_back({k - 1, k, is_joined ? 1.0 : kComponentWeight});
   }
   for (const auto& [older, newer] : kept) {
     scales.push_back({index.at(older), index.at(newer), kLinkWeight});
@@ -139,7 +144,7 @@ std::map<FrameId, Similarity> CloseLinks(const KeyframeChain& chain,
   }
   const Eigen::MatrixX3d from_first = SolveDifferences(num_keyframes, steps);
 
-  std::map<FrameId, Similarity> moves;
+  KeyframeMoves moves;
   const Eigen::Vector3d first = keyframes.front()->center_in_world;
   for (const auto& [frame, k] : index) {
     Similarity& move = moves[frame];
