@@ -12,8 +12,8 @@
 
 namespace rotslam {
 
-/// The map that a page shows, in rows that know when they changed last, so that a browser gets what
-/// is new to it alone. Versions count the maps that have been shown, from 1.
+/// The map that a page shows, in rows that have the version of their last change, so that a browser
+/// gets only rows that are new to it. Versions count the maps that have been shown, from 1.
 class ShownMap {
  public:
   /// Of larger maps only points whose track is a multiple of two, four, ... are shown.
@@ -24,8 +24,8 @@ class ShownMap {
   int version() const { return version_; }
   std::size_t num_points() const { return points_.size(); }
 
-  /// What has changed after a version, 0 for all. "points" and "keyframes" say how many rows there
-  /// are now ("count") and give those that changed, at "row"; where all have, "row" is left out.
+  /// The rows that have changed after a version, 0 for all. "points" and "keyframes" have the
+  /// number of rows ("count") and those that changed, at "row"; where all have, without "row".
   nlohmann::ordered_json After(int version) const;
 
  private:
