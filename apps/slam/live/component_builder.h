@@ -4,7 +4,7 @@
 #include <optional>
 #include <vector>
 
-#include "ba/types/bundle_options.h"
+#include "ba/bundle_adjustment.h"
 #include "krot/krot_options.h"
 #include "rotodom/camera/camera.h"
 #include "rotodom/types/reconstruction.h"

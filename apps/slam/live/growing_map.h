@@ -8,7 +8,6 @@
 #include "apps/slam/live/keyframe_chain.h"
 #include "apps/slam/live/live_map.h"
 #include "apps/slam/live/mapper_input.h"
-#include "ba/types/bundle_problem.h"
 #include "rotodom/types/reconstruction.h"
 
 namespace rotslam {
