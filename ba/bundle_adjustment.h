@@ -11,7 +11,7 @@
 
 namespace rotslam {
 
-/// Finds more of what the points' images show, once they are known to a few pixels.
+/// Finds more observations of points whose projections are known to a few pixels.
 /// @param map     poses, points and tracks, with the observations that fit.
 /// @param camera  as it is refined; the observations' bearings are its.
 /// @return  tracks of the map with other observations.
@@ -19,10 +19,10 @@ using TrackCompletion =
     std::function<std::vector<Track>(const Reconstruction& map, const Camera& camera)>;
 
 /// Minimises the robust reprojection error over rotations, centres and points, in rounds that start
-/// with the rotations held (`options.fixed_rotation`), then let them go on what fits
-/// (`options.coarse`, `options.fine`). Before every round all tracks are triangulated anew against
-/// the cameras of that moment and all observations are classified anew, so a good observation that
-/// a poor start threw out comes back.
+/// with the rotations held (`options.fixed_rotation`) and then free them (`options.coarse`,
+/// `options.fine`). Before every round all tracks are triangulated anew against the cameras of that
+/// moment and all observations are classified anew, so that a good observation that a poor start
+/// has rejected comes back.
 /// @param problem  as documented there. Throws std::invalid_argument on numbers that are
 /// not finite, sigmas that are not positive, doubled track ids or frames within a track, frames in
 /// `shared_center` or `fixed_frames` without a pose, cycles in `shared_center`.

@@ -21,7 +21,7 @@ struct PointObservation2D3D {
   Eigen::Vector2f blur = Eigen::Vector2f::Zero();  // as of Observation
 };
 
-/// Where a frame is thought to be before it is resected.
+/// The pose from which resection of a frame starts.
 struct ResectionStart {
   Rotation cam_from_world;
   Eigen::Vector3d center_in_world = Eigen::Vector3d::Zero();
@@ -31,13 +31,13 @@ struct ResectionStart {
   std::optional<Eigen::Matrix3d> rotation_covariance;
 };
 
-/// Of placing the frames between the keyframes.
+/// Options of the registration of a frame against known points.
 struct ResectionOptions {
-  // What moves. Rotations known better than points can tell them are held; so is the centre of a
-  // frame inside a pure rotation.
+  // The parameters that move. A rotation known better than points can tell it is held; so is the
+  // centre of a frame inside a pure rotation.
   bool refine_rotation = true;
   bool refine_center = true;
-  // Whether observations are less certain along their blurs. Bundle adjustment finds out.
+  // Whether observations are less certain along their blurs, as bundle adjustment decides.
   bool has_motion_blur = false;
   // Residual, in sigmas, around which Geman-McClure's weight 1 / (1 + r^2 / scale^2)^2 falls off.
   // The scale comes down to it from the median residual at the start, halving each time.
@@ -45,7 +45,7 @@ struct ResectionOptions {
   // Observations farther than this from their point are not inliers. For keypoints with sigma_px
   // above 1 it grows with sigma_px.
   double max_error_px = 3.0;
-  // Fewer inliers are no pose.
+  // Fewer inliers give no pose.
   int min_inliers = 10;
   // Steps at the last scale; an IRLS step gains about a digit.
   int max_iterations = 20;
@@ -65,8 +65,8 @@ struct ResectedPose {
   Eigen::Vector3d center_in_world = Eigen::Vector3d::Zero();
   int num_inliers = 0;
   double rms_px = 0.0;  // of the inliers
-  // Sum of the inliers' squared residuals, in sigmas, over the degrees of freedom: what their
-  // sigmas' squares would have to be multiplied by.
+  // Sum of the inliers' squared residuals, in sigmas, over the degrees of freedom: the factor by
+  // which their variances are too small.
   double variance_factor = 1.0;
   /// Of (delta, centre): delta in rad as in Exp(delta) * cam_from_world, centre in world units;
   /// from the inliers' sigmas and the rotation's own covariance where given. Zero for what was
@@ -90,8 +90,8 @@ std::optional<ResectedPose> ResectFrame(const Camera& camera,
                                         const ResectionStart& start,
                                         const ResectionOptions& options);
 
-/// The same of a pose that is known and stays: the start's, its rotation no measurement. What the
-/// options let move has a covariance.
+/// The same for a known pose, which stays: that of the start, whose rotation does not count as a
+/// measurement. The covariance is that of the parameters that the options let move.
 /// Cost:    one pass over the observations.
 std::optional<ResectedPose> AssessPose(const Camera& camera,
                                        const std::vector<PointObservation2D3D>& observations,

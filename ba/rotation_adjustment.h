@@ -7,7 +7,7 @@
 
 namespace rotslam {
 
-/// What rotations alone make of a sequence.
+/// The result of a bundle adjustment of rotations alone.
 struct PureRotationResult {
   BundleStatus status = BundleStatus::kNotRun;
   RotationMap cam_from_world;  // of every frame given; the first one stays
@@ -25,11 +25,11 @@ struct PureRotationResult {
   }
 };
 
-/// Bundle adjustment as if the camera never left its place: rotations, a direction for each track,
-/// and the lens where `options.lens` lets any of it move. A turn tells the focal length, which a
-/// path does not: it is free as far as a calibration may be wrong by some percent.
-/// Whether the camera only turns is not decided here: a moving camera gets the best such
-/// explanation, which leaves out most of what it sees.
+/// Bundle adjustment of a pure rotation: orientations, a direction for each track, and the lens
+/// where `options.lens` lets any of it move. A rotation determines the focal length, which a path
+/// does not: it may move as far as a calibration may be wrong, by some percent.
+/// This does not decide whether the camera only rotates: a moving camera gets the best such
+/// explanation, which leaves out most observations.
 /// Source:  Hartley, Self-calibration of stationary cameras, IJCV 1997.
 /// Throws std::invalid_argument as RefineBundle does.
 PureRotationResult RefinePureRotation(const Camera& camera,

@@ -6,9 +6,9 @@
 
 namespace rotslam {
 
-/// What RefineBundle needs to refine the newest frames of a stream only: they and the points they
-/// see move, older frames that see those points stand and hold the gauge, the rest stays outside,
-/// so that the cost does not grow with the stream.
+/// The problem with which RefineBundle refines only the newest frames of a stream. They and the
+/// points they see move; older frames that see those points are fixed and hold the gauge; all else
+/// is left out, so that the cost does not grow with the stream.
 /// @param map     poses, points and tracks so far, of all frames.
 /// @param window  frames to refine; those without a pose are left out.
 /// @return  a problem whose `fixed_frames` are the older ones; empty when `window` names no pose.

@@ -149,7 +149,8 @@ Placing TakeCenters(const std::vector<FrameId>& views,
   return placing;
 }
 
-// The points of a structure, and those of the other tracks triangulated anew.
+// The points of a structure, and those of the other tracks triangulated anew. Seven parameters: the
+// structure with its names and placing, the arguments of TriangulateAll, and the result.
 void TakePoints(const KrotProblem& problem,
                 const std::vector<double>& thresholds,
                 const NamedProblem& named,

@@ -10,13 +10,13 @@
 
 namespace rotslam {
 
-/// Which answer gives the positions. All lead bundle adjustment to one minimum.
+/// The solution that gives the positions. All lead bundle adjustment to the same minimum.
 enum class KrotStart {
   kL1,           // least sum of misses: forgives outliers, the better start for bundle adjustment
   kBisection,    // least largest residual of what kL1 kept
   kPositioning,  // rays nearest to what was seen (SolveGlobalPositioning), no linear programs
 };
-/// The words for them in option files: "l1", "bisection", "positioning".
+/// Their names in option files: "l1", "bisection", "positioning".
 std::span<const char* const> OptionWords(KrotStart);
 
 /// All parts of the known-rotation solver. The defaults run a real sequence untouched.

@@ -8,7 +8,7 @@
 
 namespace rotslam {
 
-/// What all steps of the known-rotation solver read. It owns nothing.
+/// The input that all steps of the known-rotation solver read. It owns nothing.
 struct KrotProblem {
   const RotationMap& cam_from_world;
   const std::vector<Track>& tracks;  // clean: finite unit bearings, frames ascending (CleanTracks)

@@ -55,8 +55,8 @@ struct KrotSolution {
   // bracket covers lies in [gamma_low, gamma_high]; the largest over the components.
   double gamma_low = 0.0;
   double gamma_high = kInfinity;
-  // What the bracket covers: every observation that the triangulation from the start's positions
-  // kept (to loose_factor thresholds), less than 80 deg off the axis.
+  // The bracket covers every observation that the triangulation from the start's positions kept (to
+  // loose_factor thresholds), less than 80 deg off the axis. Their number, and that of the tracks:
   int num_bracket_observations = 0;
   int num_bracket_tracks = 0;
   std::vector<ActiveObservation> active;    // of the component that has gamma_high

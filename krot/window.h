@@ -10,7 +10,7 @@ namespace rotslam {
 /// Places the newest views of a stream: the robust start's programs over the views that their
 /// tracks reach, where every centre and point that is known already stays as it is, to the last
 /// bit. The scale is that of what is known.
-/// @param known   what was found so far; views are taken from the component of the newest one that
+/// @param known   the solution so far; views are taken from the component of the newest view that
 ///                the tracks name.
 /// @param tracks  of the window: the new views' tracks with all their observations. A track with a
 ///                known point adds to the new centres only.

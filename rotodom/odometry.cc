@@ -6,14 +6,12 @@
 
 #include "rotodom/motion_blur/blurred_patch.h"
 #include "rotodom/motion_blur/keypoint_blur.h"
+#include "rotodom/tracking/robust_tracking.h"
 #include "rotodom/types/options.h"
 #include "rotodom/types/stopwatch.h"
 
 namespace rotslam {
 namespace {
-
-// Two measurements of one rotation, the rougher by unrefined corners, differ by less.
-constexpr double kSameRotationDeg = 3.0;
 
 const EdgeWithMatches* BestOf(const std::vector<EdgeWithMatches>& connections) {
   const auto best = std::max_element(connections.begin(),
@@ -57,7 +55,7 @@ void MoveToBearings(const Camera& camera, Features& features) {
   }
 }
 
-// A radian and more means that nothing is known.
+// Deviations of a radian and more mean that nothing is known.
 std::optional<Eigen::Matrix3d> UnlessUnknown(std::optional<Eigen::Matrix3d> covariance) {
   if (!covariance || covariance->trace() > 3.0) return std::nullopt;
   return covariance;
@@ -198,78 +196,18 @@ TrackingResult RotationalOdometry::Track(const std::vector<OrientedView>& views,
                                          const TrackingTarget& target,
                                          FrameEstimate& estimate) {
   const Stopwatch stopwatch(seconds_.tracking);
-  TrackingResult tracked = TrackPoints(views, target, camera_, options_.tracking, num_threads_);
-  if (views.empty() || !tracked.IsPoor(options_.tracking)) return tracked;
-  const auto recovery = RecoverMotion(views,
-                                      target,
-                                      camera_,
-                                      {options_.features,
-                                       options_.matching,
-                                       options_.relative_rotation,
-                                       options_.tracking,
-                                       kMinInlierRatio,
-                                       seed_,
-                                       num_threads_});
-  estimate.report.searched_wide = true;
-  // Patches that look alike can be found in the wrong places all together; descriptors, sought
-  // everywhere, are another witness, better by the places to which their matches were moved.
-  const bool is_clear = recovery && recovery->is_clear;
-  std::optional<Rotation> witness;
-  if (is_clear) {
-    const Agreement moved = AgreementOf({recovery->cam_from_world, recovery->points, 0}, views);
-    witness = moved.num_points > 0 ? moved.cam_from_world : recovery->cam_from_world;
-  }
-  TrackingResult best;
-  best.cam_from_world = target.cam_from_world;
-  int most_agreeing = 0;
-  const auto consider = [&](TrackingResult&& candidate) {
-    const Agreement agreement = AgreementOf(candidate, views);
-    if (agreement.num_points <= most_agreeing) return;
-    const Rotation doubt = witness ? agreement.cam_from_world * witness->Inverse() : Rotation();
-    if (doubt.AngleDeg() > kSameRotationDeg) return;
-    most_agreeing = agreement.num_points;
-    best = std::move(candidate);
-  };
-  // Without that witness, few of many points may have been found on anything.
-  const bool is_plausible = static_cast<double>(tracked.points.size()) >=
-                            options_.tracking.min_found_ratio * tracked.num_sought;
-  if (is_clear || is_plausible) consider(std::move(tracked));
-  if (recovery) {
-    TrackingTarget corrected = target;
-    corrected.cam_from_world = recovery->guide_cam_from_world;
-    corrected.flow = &recovery->flow;
-    TrackingResult guided = TrackPoints(views, corrected, camera_, options_.tracking, num_threads_);
-    // By a wrong guide few patches are found.
-    if (is_clear || !guided.IsPoor(options_.tracking)) consider(std::move(guided));
-  }
-  if (is_clear) consider({recovery->cam_from_world, recovery->points, 0});
-  return best;
-}
-
-RotationalOdometry::Agreement RotationalOdometry::AgreementOf(
-    const TrackingResult& tracked, const std::vector<OrientedView>& views) const {
-  Agreement most;
-  for (int v = 0; v < static_cast<int>(views.size()); ++v) {
-    std::vector<BearingPair> pairs;
-    for (const TrackedPoint& point : tracked.points) {
-      if (point.view != v) continue;
-      if (const auto bearing = camera_.Unproject(point.keypoint_px)) {
-        pairs.push_back({views[v].view->features.bearings[point.index], *bearing});
-      }
-    }
-    const auto estimate =
-        EstimateRelativeRotation({pairs},
-                                 tracked.cam_from_world * views[v].cam_from_world.Inverse(),
-                                 camera_.MeanFocal(),
-                                 options_.relative_rotation,
-                                 seed_);
-    if (!estimate) continue;
-    const int agreeing = static_cast<int>(estimate->inliers.size());
-    const double ratio = static_cast<double>(agreeing) / static_cast<double>(pairs.size());
-    if (ratio <= kMinInlierRatio || agreeing <= most.num_points) continue;
-    most = {agreeing, estimate->j_from_i * views[v].cam_from_world};
-  }
-  return most;
+  RobustTracking robust = TrackOrRecover(views,
+                                         target,
+                                         camera_,
+                                         {options_.features,
+                                          options_.matching,
+                                          options_.relative_rotation,
+                                          options_.tracking,
+                                          kMinInlierRatio,
+                                          seed_,
+                                          num_threads_});
+  estimate.report.searched_wide = robust.searched_wide;
+  return std::move(robust.tracked);
 }
 
 void RotationalOdometry::AppendTracked(const TrackingResult& tracked,
@@ -566,7 +504,8 @@ void RotationalOdometry::UpdateKeyframes(std::shared_ptr<View> view) {
     }
   }
   if (static_cast<int>(recent_.size()) == options_.view_graph.window_frames) {
-    // What matches nothing, a hand before the lens, must not push out what may be seen again.
+    // A frame that matches nothing, as with a hand before the lens, must not replace frames whose
+    // points may be seen again.
     if (is_connected(*recent_.front())) {
       // Of a keyframe only the features are asked for.
       recent_.back()->pyramid = {};

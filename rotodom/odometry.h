@@ -50,7 +50,7 @@ struct FrameReport {
   bool searched_wide = false;   // tracking failed, descriptors were matched instead
 };
 
-/// Where the time goes, seconds since the start.
+/// Time spent in each stage since the start, s.
 struct OdometrySeconds {
   double pyramid = 0.0;
   double tracking = 0.0;  // recovery and the time of exposure included
@@ -60,7 +60,7 @@ struct OdometrySeconds {
   double covariance = 0.0;
 };
 
-/// What one frame brought.
+/// The result for one frame.
 struct FrameEstimate {
   FrameId frame;
   double timestamp_s = 0.0;
@@ -112,7 +112,7 @@ class RotationalOdometry {
 
   const OdometrySeconds& seconds() const { return seconds_; }
 
-  /// What the images of late tell of their time of exposure, as ExposureMeter::Seconds().
+  /// Exposure time as the newest images tell it, s (ExposureMeter::Seconds()).
   double exposure_s() const { return exposure_.Seconds(); }
 
   /// Covariance of a frame that is still in the window, as in FrameEstimate.
@@ -134,14 +134,6 @@ class RotationalOdometry {
   TrackingResult Track(const std::vector<OrientedView>& views,
                        const TrackingTarget& target,
                        FrameEstimate& estimate);
-  // The most points of one view that agree on a relative rotation, and that; none where fewer do
-  // than chance could make.
-  struct Agreement {
-    int num_points = 0;
-    Rotation cam_from_world;
-  };
-  Agreement AgreementOf(const TrackingResult& tracked,
-                        const std::vector<OrientedView>& views) const;
   void AppendTracked(const TrackingResult& tracked,
                      const std::vector<OrientedView>& views,
                      View& view) const;
@@ -187,7 +179,7 @@ class RotationalOdometry {
   ExposureMeter exposure_;
 };
 
-/// What is known of a sequence: the frames' estimates put together.
+/// The result for a sequence: the estimates of all frames together.
 struct OdometryResult {
   ViewGraph graph;
   RotationMap cam_from_world;  // one entry per frame

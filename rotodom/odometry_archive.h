@@ -5,7 +5,7 @@
 #include "rotodom/odometry.h"
 #include "rotodom/types/archive.h"
 
-// What frames leave behind, to and from bytes (rotodom/types/archive.h).
+// Serialisation of the results for single frames (rotodom/types/archive.h).
 
 namespace rotslam {
 

@@ -11,7 +11,7 @@
 
 namespace rotslam {
 
-/// What a batch was asked to do with one sequence: all that its result depends on, as one line of
+/// The request of a batch for one sequence: everything that its result depends on, as one line of
 /// JSON. Equal requests have equal results.
 std::string RequestOf(const BatchEntry& entry, std::uint64_t seed);
 

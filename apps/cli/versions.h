@@ -4,8 +4,8 @@
 
 namespace rotslam {
 
-/// What --version prints: this program, what compiled it, the libraries it uses. Where a library
-/// tells at run time which one it is, that is asked.
+/// The text of --version: this program, its compiler, the libraries it uses. Libraries that tell
+/// their version at run time are asked for it.
 std::string VersionText();
 
 }  // namespace rotslam

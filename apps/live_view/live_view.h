@@ -38,7 +38,7 @@ class LiveView {
   void Finish();
 
   int port() const;
-  /// Where a browser on this machine finds the page.
+  /// The address of the page for a browser on this machine.
   std::string url() const;
 
  private:

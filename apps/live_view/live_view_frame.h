@@ -19,7 +19,7 @@ struct LiveViewStats {
   int num_loops = 0;
 };
 
-/// What the page shows of a frame.
+/// The data of a frame that the page shows.
 struct LiveViewFrame {
   LiveEstimate estimate;
   cv::Mat image;  // 8-bit, one channel or three (blue, green, red); empty: none

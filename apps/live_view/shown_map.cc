@@ -5,16 +5,15 @@
 namespace rotslam {
 
 bool ShownMap::Keyframe::IsSameAs(const Keyframe& other) const {
-  return frame == other.frame && time_s == other.time_s && quaternion == other.quaternion &&
-         position == other.position && part == other.part;
+  return frame == other.frame && quaternion == other.quaternion && position == other.position;
 }
 
-void ShownMap::Update(const LiveMap& map, double first_time_s) {
+void ShownMap::Update(const LiveMap& map) {
   ++version_;
   revision_ = map.revision;
   num_corrections_ = map.num_corrections;
   UpdatePoints(map.points);
-  UpdateKeyframes(map.keyframes, first_time_s);
+  UpdateKeyframes(map.keyframes);
 }
 
 void ShownMap::UpdatePoints(const std::vector<LivePoint>& points) {
@@ -54,15 +53,13 @@ void ShownMap::RemoveUnseenPoints() {
   }
 }
 
-void ShownMap::UpdateKeyframes(const std::vector<LiveKeyframe>& keyframes, double first_time_s) {
+void ShownMap::UpdateKeyframes(const std::vector<LiveKeyframe>& keyframes) {
   keyframes_.resize(keyframes.size());
   for (std::size_t row = 0; row < keyframes.size(); ++row) {
     const LiveKeyframe& keyframe = keyframes[row];
     const Keyframe now = {keyframe.frame.value,
-                          static_cast<float>(keyframe.timestamp_s - first_time_s),
                           keyframe.cam_from_world.Inverse().Quaternion().coeffs().cast<float>(),
                           keyframe.center_in_world.cast<float>(),
-                          keyframe.part,
                           version_};
     if (keyframes_[row].changed == 0 || !keyframes_[row].IsSameAs(now)) keyframes_[row] = now;
   }
@@ -96,8 +93,6 @@ nlohmann::ordered_json ShownMap::PointsAfter(int version) const {
 nlohmann::ordered_json ShownMap::KeyframesAfter(int version) const {
   std::vector<std::int32_t> rows;
   std::vector<std::int32_t> frame;
-  std::vector<std::int32_t> part;
-  std::vector<float> time_s;
   std::vector<float> quaternion;
   std::vector<float> position;
   for (std::size_t row = 0; row < keyframes_.size(); ++row) {
@@ -105,17 +100,13 @@ nlohmann::ordered_json ShownMap::KeyframesAfter(int version) const {
     if (keyframe.changed <= version) continue;
     rows.push_back(static_cast<std::int32_t>(row));
     frame.push_back(keyframe.frame);
-    part.push_back(keyframe.part);
-    time_s.push_back(keyframe.time_s);
     quaternion.insert(quaternion.end(), keyframe.quaternion.data(), keyframe.quaternion.data() + 4);
     position.insert(position.end(), keyframe.position.data(), keyframe.position.data() + 3);
   }
   nlohmann::ordered_json changes = {{"count", keyframes_.size()},
                                     {"frame", EncodedArray(frame, 1)},
-                                    {"time_s", EncodedArray(time_s, 1)},
                                     {"quaternion", EncodedArray(quaternion, 4)},
-                                    {"position", EncodedArray(position, 3)},
-                                    {"part", EncodedArray(part, 1)}};
+                                    {"position", EncodedArray(position, 3)}};
   if (rows.size() < keyframes_.size()) changes["row"] = EncodedArray(rows, 1);
   return changes;
 }

@@ -12,20 +12,20 @@
 
 namespace rotslam {
 
-/// The map that a page shows, in rows that know when they changed last, so that a browser gets what
-/// is new to it alone. Versions count the maps that have been shown, from 1.
+/// The map that a page shows, in rows that have the version of their last change, so that a browser
+/// gets only rows that are new to it. Versions count the maps that have been shown, from 1.
 class ShownMap {
  public:
   /// Of larger maps only points whose track is a multiple of two, four, ... are shown.
   static constexpr std::size_t kMaxPoints = 100'000;
 
-  void Update(const LiveMap& map, double first_time_s);
+  void Update(const LiveMap& map);
 
   int version() const { return version_; }
   std::size_t num_points() const { return points_.size(); }
 
-  /// What has changed after a version, 0 for all. "points" and "keyframes" say how many rows there
-  /// are now ("count") and give those that changed, at "row"; where all have, "row" is left out.
+  /// The rows that have changed after a version, 0 for all. "points" and "keyframes" have the
+  /// number of rows ("count") and those that changed, at "row"; where all have, without "row".
   nlohmann::ordered_json After(int version) const;
 
  private:
@@ -38,10 +38,8 @@ class ShownMap {
   };
   struct Keyframe {
     int frame = 0;
-    float time_s = 0.0F;  // since the first frame
     Eigen::Vector4f quaternion;
     Eigen::Vector3f position;
-    int part = 0;
     int changed = 0;
 
     bool IsSameAs(const Keyframe& other) const;
@@ -49,7 +47,7 @@ class ShownMap {
 
   void UpdatePoints(const std::vector<LivePoint>& points);
   void RemoveUnseenPoints();
-  void UpdateKeyframes(const std::vector<LiveKeyframe>& keyframes, double first_time_s);
+  void UpdateKeyframes(const std::vector<LiveKeyframe>& keyframes);
   nlohmann::ordered_json PointsAfter(int version) const;
   nlohmann::ordered_json KeyframesAfter(int version) const;
 

@@ -26,7 +26,7 @@ class ShownSamples {
   int NewestFrame() const { return samples_.empty() ? -1 : samples_.back().frame; }
   double FirstTime() const { return first_time_s_; }
 
-  /// What has been added after a frame, -1 for all: "stride", and arrays with a row for each frame.
+  /// The samples after a frame, -1 for all: "stride", and arrays with a row for each frame.
   /// Who holds the samples itself may drop those that are not among the newest and whose frame is
   /// no multiple of the stride.
   nlohmann::ordered_json After(int frame) const;

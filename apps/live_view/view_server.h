@@ -12,10 +12,10 @@ struct ViewText {
   bool is_last = false;  // the stream ends behind it
 };
 
-/// What a browser is sent next. It may wait some seconds for it.
+/// Gives the next message for a browser. It may wait some seconds for one.
 using NextText = std::function<ViewText()>;
 
-/// What a server shows.
+/// The pages and streams of a server.
 struct ViewContent {
   std::string page;  // HTML, at /
   // Of a browser that opens the stream of events, at /events; it is called from the browser's own

@@ -37,7 +37,7 @@ void ViewState::SetMap(const std::shared_ptr<const LiveMap>& map) {
     correction_times_s_.push_back(
         static_cast<float>(map->keyframes.back().timestamp_s - first_time_s));
   }
-  shown_map_.Update(*map, first_time_s);
+  shown_map_.Update(*map);
   map_ = map;
 }
 

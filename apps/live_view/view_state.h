@@ -13,7 +13,7 @@
 
 namespace rotslam {
 
-/// What one browser has been told.
+/// The newest version of everything that one browser has been sent.
 struct ViewCursor {
   bool has_begun = false;
   int state = 0;  // version of the whole
@@ -35,13 +35,13 @@ class ViewState {
   void Finish();
   bool is_finished() const { return is_finished_; }
 
-  /// Whether there is something to tell.
+  /// Whether anything has changed for this browser.
   bool IsAhead(const ViewCursor& cursor) const {
     return !cursor.has_begun || cursor.state != version_;
   }
 
-  /// What has changed, as one line of JSON; the first message of a browser has "whole" and all
-  /// there is.
+  /// Everything that has changed, as one line of JSON. The first message of a browser has "whole"
+  /// and everything.
   std::string TakeMessage(ViewCursor& cursor) const;
 
  private:

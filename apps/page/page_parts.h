@@ -6,13 +6,13 @@
 
 namespace rotslam {
 
-/// What stands in a template in place of a mark.
+/// The content that replaces a mark of a template.
 struct PagePart {
   std::string_view mark;
   std::string_view content;
 };
 
-/// What our pages share: the parts {{three_license}}, {{style}}, {{three}}, {{orbit_controls}},
+/// The parts that our pages share: {{three_license}}, {{style}}, {{three}}, {{orbit_controls}},
 /// {{helpers_script}}, {{chart_script}} and {{view_script}}.
 std::vector<PagePart> SharedPageParts();
 

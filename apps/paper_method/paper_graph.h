@@ -48,7 +48,7 @@ class PaperGraph {
  public:
   explicit PaperGraph(const PaperGraphOptions& options);
 
-  /// What a frame brought.
+  /// The result for one frame.
   struct Step {
     std::vector<RelativeRotation> edges;  // of the frame, the newest partner first
     bool predicted_only = false;          // no edge: the orientation is the prediction

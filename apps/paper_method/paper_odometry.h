@@ -15,7 +15,7 @@
 
 namespace rotslam {
 
-/// What PaperOdometry needs to know.
+/// Options of PaperOdometry.
 struct PaperOdometryOptions {
   OdometryOptions odometry;  // PaperDefaults
   bool use_loops = true;
@@ -35,7 +35,7 @@ struct PaperSeconds {
   double loops = 0.0;  // averaging of all included
 };
 
-/// What one frame brought.
+/// The result for one frame.
 struct PaperFrame {
   FrameId frame;
   Rotation cam_from_world;

@@ -11,7 +11,7 @@
 
 namespace rotslam {
 
-/// What matching needs of a frame.
+/// The features of a frame, as matching takes them.
 struct OrbView {
   FrameId frame;
   std::vector<Eigen::Vector2d> keypoints_px;

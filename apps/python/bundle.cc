@@ -73,7 +73,7 @@ py::dict Describe(const BundleResult& result, int num_views) {
       "rms_px"_a = after.rms_px);
 }
 
-// The keyword arguments of rotslam.refine_bundle.
+// Twelve parameters: the keyword arguments of rotslam.refine_bundle.
 py::dict Refine(const py::object& cam_from_world,
                 const py::object& centers,
                 const py::object& view,
@@ -101,9 +101,7 @@ py::dict Refine(const py::object& cam_from_world,
     problem.shared_center[FrameId{one}] = FrameId{other};
   }
   for (const int fixed : fixed_views) problem.fixed_frames.insert(FrameId{fixed});
-  auto options = OptionsFrom<BundleOptions>(given_options);
-  CheckThreads(threads);
-  options.num_threads = threads;
+  const auto options = OptionsFrom<BundleOptions>(given_options, threads);
   BundleResult result;
   {
     const py::gil_scoped_release unlocked;

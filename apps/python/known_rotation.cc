@@ -66,9 +66,7 @@ py::dict Solve(const py::object& cam_from_world,
   const std::vector<Track> all_tracks = TracksFrom(view, track, keypoints_px, sigma_px, camera);
   std::map<FrameId, double> noise_rad;
   if (!sigma_rad.is_none()) noise_rad = SigmasFrom("sigma_rad", sigma_rad, num_views);
-  KrotOptions options = OptionsFrom<KrotOptions>(given_options);
-  CheckThreads(threads);
-  options.num_threads = threads;
+  const auto options = OptionsFrom<KrotOptions>(given_options, threads);
   KrotSolution solution;
   {
     const py::gil_scoped_release unlocked;

@@ -2,8 +2,8 @@
 
 #include <pybind11/pybind11.h>
 
-// What the module is made of: each adds its classes and functions with their docstrings, which are
-// the manual; the algorithms' own are in the C++ headers named there.
+// The parts of the module: each adds its classes and functions with their docstrings. These are the
+// manual; they name the C++ headers that describe the algorithms.
 
 namespace rotslam {
 

@@ -32,4 +32,13 @@ Options OptionsFrom(const pybind11::object& given) {
 /// Throws std::invalid_argument unless there is at least one.
 void CheckThreads(int threads);
 
+/// The same with so many threads.
+template <class Options>
+Options OptionsFrom(const pybind11::object& given, int threads) {
+  Options options = OptionsFrom<Options>(given);
+  CheckThreads(threads);
+  options.num_threads = threads;
+  return options;
+}
+
 }  // namespace rotslam

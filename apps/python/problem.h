@@ -11,8 +11,8 @@
 #include "rotodom/types/track.h"
 #include "rotodom/types/trajectory.h"
 
-// What several functions of the module take and give: views are numbered from 0. What does not fit
-// throws std::invalid_argument.
+// Conversions between Python and the problem types that several functions of the module take. Views
+// are numbered from 0. Arrays of the wrong size throw std::invalid_argument.
 
 namespace rotslam {
 

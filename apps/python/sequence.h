@@ -22,7 +22,7 @@ class PySequence {
   std::optional<Camera> OwnCamera() const;
   std::optional<std::string> GroundTruth() const;
 
-  // What it was opened with.
+  // The arguments that it was opened with.
   const std::string& path() const { return path_; }
   const SequenceOptions& options() const { return options_; }
 

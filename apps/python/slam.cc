@@ -139,10 +139,8 @@ std::unique_ptr<PyResult> Run(const py::object& sequence,
                               bool align,
                               std::uint64_t seed,
                               int threads) {
-  SlamOptions options = OptionsFrom<SlamOptions>(given_options);
-  CheckThreads(threads);
+  auto options = OptionsFrom<SlamOptions>(given_options, threads);
   options.seed = seed;
-  options.num_threads = threads;
   if (!progress.is_none() && PyCallable_Check(progress.ptr()) == 0) {
     throw std::invalid_argument("progress must be a function of (stage, step, num_steps)");
   }

@@ -34,7 +34,7 @@ class ImageList : public FrameSource {
   std::size_t next_ = 0;
 };
 
-/// What rotslam.Result shows of a SlamResult.
+/// A SlamResult as Python sees it, rotslam.Result.
 class PyResult {
  public:
   explicit PyResult(const SlamResult& result);

@@ -30,7 +30,7 @@ struct CheckReason {
   bool warns = false;  // `run` warns of it; of the others it does so by itself, or not at all
 };
 
-/// What a run's folder says about its quality; files that are missing leave their fields empty.
+/// The files of a run that tell its quality. A missing file leaves its field empty.
 // NOLINTNEXTLINE(bugprone-exception-escape): moving a JSON value is noexcept.
 struct RunFacts {
   nlohmann::ordered_json summary;
@@ -39,7 +39,7 @@ struct RunFacts {
   std::vector<LoopRow> loops;
 };
 
-/// What in a run to trust.
+/// How far a run can be trusted, and why.
 struct RunCheck {
   Verdict verdict = Verdict::kGreen;  // the worst of the reasons'
   std::vector<CheckReason> reasons;   // the worst first

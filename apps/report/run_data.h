@@ -43,8 +43,8 @@ struct LensData {
   std::vector<double> displacement_px;  // from where it would show the ray without distortion
   // One standard deviation of the distance; empty where the run does not know it.
   std::vector<double> sigma_px;
-  // Where the calibration that was given, or that lies with the images, shows the same rays, from
-  // the same place; NaN where it does not. Empty: there is none, or the run has not changed it.
+  // Pixels at which the calibration that was given, or that lies with the images, shows the same
+  // rays; NaN where it does not. Empty: there is none, or the run has not changed it.
   std::vector<double> given_px;
 };
 

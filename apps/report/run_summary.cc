@@ -63,6 +63,12 @@ Json ReadSummaryOf(const std::filesystem::path& run) {
   return *std::move(summary);
 }
 
+double SummaryNumber(const Json& summary, const std::string& group, const std::string& key) {
+  if (!summary.contains(group) || !summary.at(group).is_object()) return 0.0;
+  const Json& values = summary.at(group);
+  return values.contains(key) && values.at(key).is_number() ? values.at(key).get<double>() : 0.0;
+}
+
 SequenceOptions SequenceOptionsOf(const Json& summary) {
   SequenceOptions options;
   options.first = OptionOf<int>(summary, "first");

@@ -2,6 +2,7 @@
 
 #include <filesystem>
 #include <optional>
+#include <string>
 
 #include <nlohmann/json.hpp>
 
@@ -16,6 +17,11 @@ std::optional<nlohmann::ordered_json> ReadJsonObject(const std::filesystem::path
 
 /// Reads summary.json of a run's folder. Throws std::runtime_error with path and reason.
 nlohmann::ordered_json ReadSummaryOf(const std::filesystem::path& run);
+
+/// A number of a group of the summary; 0 where it has none.
+double SummaryNumber(const nlohmann::ordered_json& summary,
+                     const std::string& group,
+                     const std::string& key);
 
 /// The frames of its sequence that the run has used. Throws std::runtime_error where the summary
 /// does not contain them.

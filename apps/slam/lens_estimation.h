@@ -19,16 +19,16 @@ double GuessFocalLength(const cv::Size& image_size);
 /// image.
 Camera UncalibratedCamera(const cv::Size& image_size, double focal_px);
 
-/// Lets bundle adjustment estimate all parameters of a lens that no calibration tells. Priors are
-/// wide but for those of the tangential coefficients.
+/// Lets bundle adjustment estimate all parameters of an uncalibrated lens. Priors are wide, except
+/// those of the tangential coefficients.
 /// @param expected  the principal point and the distortion that most lenses of this kind have.
 void FreeLens(const Camera& expected, LensOptions& lens);
 
-/// Most lenses that an estimate may be of: the same model and focal length, without distortion and
-/// with the principal point in the middle of the image.
+/// The expected lens for an estimate: the same model and focal length, without distortion and with
+/// the principal point in the middle of the image.
 Camera PlainLens(const Camera& estimate);
 
-/// An unknown camera, before the images are asked.
+/// The first guess of an unknown camera, before its images are used.
 struct LensGuess {
   Camera camera;             // see UncalibratedCamera
   bool knows_focal = false;  // its focal length is right within 15 %, as from EXIF data
@@ -43,10 +43,10 @@ struct LensEstimate {
   bool interrupted = false;      // the observer asked to stop
 };
 
-/// What an estimate is for.
+/// The purpose of an estimate.
 enum class LensPurpose {
-  kCameraFile,  // as good as 600 frames tell it
-  kStart,       // where a run starts from, which refines it: the fewest frames that tell it
+  kCameraFile,  // as accurate as 600 frames allow
+  kStart,       // start values of a run, which refines them: from as few frames as suffice
 };
 
 /// Estimates an unknown lens from the first 600 frames, or less: model, focal length, principal
@@ -56,7 +56,7 @@ enum class LensPurpose {
 /// lens of the round before until it changes little.
 /// @param frames  rewound to the first frame at the end.
 /// @param inputs  masks, and whether static content is looked for.
-/// Throws what FindOrientations throws.
+/// Throws what FindOrientations throws. Six parameters: those of FindOrientations, and the purpose.
 LensEstimate EstimateLens(FrameSource& frames,
                           const LensGuess& guess,
                           const SlamOptions& options,

@@ -19,7 +19,7 @@
 
 namespace rotslam {
 
-/// What the first stage has measured, as it is through another lens.
+/// The orientations of the first stage, computed again for another lens.
 struct LensOrientations {
   ViewGraph graph;             // relative rotations
   RotationMap cam_from_world;  // averaged over them
@@ -34,7 +34,7 @@ struct MapResult {
   Reconstruction cloud;    // every frame, and the points of all tracks with enough parallax
   Camera camera;           // as the map's largest component has refined it
   LensSigmas lens_sigmas;  // of `camera`, see StatedSigmas
-  // The same with what the errors of the parameters have in common, relative to `camera`; nullopt
+  // The same with the correlations of the parameters' errors, relative to `camera`; nullopt
   // where the map has not refined the lens.
   std::optional<LensCovariance> lens_covariance;
   CalibrationCheck calibration_check;  // of the largest component

@@ -47,7 +47,7 @@ class SlamObserver {
   /// The readout was estimated from the images. The first stage starts again with it.
   virtual void OnReadoutFound(const ReadoutEstimate& /*readout*/) {}
   /// Static content was found. On the picture it is masked and the first stage starts again; a
-  /// camera that stands is told after the last frame.
+  /// camera that stands is reported after the last frame.
   virtual void OnStaticContent(const StaticContent& /*content*/) {}
   /// The image of a frame of the map cannot be read again; no points are looked for in it.
   virtual void OnMissingImage(const std::string& /*problem*/) {}

@@ -36,8 +36,8 @@ struct ReadoutOptions {
 
 /// Options of the whole system, stage by stage. The defaults suit real sequences.
 struct SlamOptions {
-  // Images whose longer side is larger are reduced to at most this before anything is looked for in
-  // them (WorkingSize): less keeps fewer details and takes less time.
+  // Images whose longer side is larger are reduced to at most this before features are detected
+  // (WorkingSize): less keeps fewer details and takes less time.
   int max_image_side_px = 1600;
   OdometryOptions rotodom;
   ReadoutOptions readout;

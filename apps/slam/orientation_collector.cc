@@ -230,8 +230,8 @@ void TellOfRestart(const FoundInImages& found, SlamObserver& observer, FrameLog*
   log->StartOver(all);
 }
 
-// FindOrientations with what is known of the camera and the picture by now: given, found in the
-// images, or found by the interrupted run.
+// FindOrientations with the properties of camera and picture that are known by now: given, found in
+// the images, or found by the interrupted run. Six parameters: its own, and these.
 Orientations FindWith(const FoundInImages& known,
                       FrameSource& frames,
                       const Camera& camera,

@@ -3,7 +3,7 @@
 #include <functional>
 #include <optional>
 
-#include "apps/slam/frame_stream.h"
+#include "apps/slam/input/frame_stream.h"
 #include "apps/slam/orientations.h"
 #include "apps/slam/readout_decision.h"
 
@@ -13,7 +13,7 @@ namespace rotslam {
 /// live session with those that a camera delivers.
 class OrientationCollector {
  public:
-  /// @param known    what the images have told before.
+  /// @param known    found in the images before tracking started again.
   /// @param options  must outlive the object.
   /// Throws std::invalid_argument when an option is out of range.
   OrientationCollector(const FoundInImages& known,
@@ -26,9 +26,9 @@ class OrientationCollector {
   /// Tracks the next frame; pass the result to Take().
   TrackedFrame Track(Frame frame);
   /// Adds a tracked frame.
-  /// @return  what the images show, for which tracking has to start again.
+  /// @return  findings for which tracking has to start again; nullopt: none.
   std::optional<FoundInImages> Take(TrackedFrame&& tracked, SlamObserver& observer);
-  /// Call after the last frame: asks the images what only all of them can tell.
+  /// Call after the last frame: makes the decisions that need all frames.
   std::optional<FoundInImages> EndFrames();
   /// The orientations; call it last. Throws std::runtime_error as FindOrientations does.
   /// @param commit  called when the orientations are known to be usable; may be empty.

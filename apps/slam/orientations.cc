@@ -2,11 +2,10 @@
 
 #include <algorithm>
 #include <cmath>
-#include <iterator>
-#include <stdexcept>
 #include <utility>
 
-#include "rotodom/types/disjoint_sets.h"
+#include "rotodom/averaging/global_averaging.h"
+#include "rotodom/self_calibration/through_lens.h"
 #include "rotodom/types/median.h"
 
 namespace rotslam {
@@ -48,6 +47,32 @@ void InterpolateUnknown(const Orientations& orientations,
       entry->second = is_given(entry) ? given_at(entry, turn_of(after)) : after->second;
     }
   }
+}
+
+std::optional<Orientations> ThroughFoundLens(const Orientations& orientations,
+                                             const Camera& found,
+                                             const SlamOptions& options) {
+  if (!options.ba.lens.expected || orientations.given) return std::nullopt;
+  Orientations seen;
+  seen.camera = found;
+  seen.timestamps_s = orientations.timestamps_s;
+  seen.unconnected = orientations.unconnected;
+  seen.covariance = orientations.covariance;
+  seen.cam_from_world = orientations.cam_from_world;
+  seen.graph = TurnedThroughLens(orientations.graph, orientations.camera, found);
+  for (const auto& [frame, rotation] : CloseLoops(seen.graph.edges(),
+                                                  orientations.cam_from_world,
+                                                  options.rotodom.averaging,
+                                                  options.num_threads)
+                                           .cam_from_world) {
+    seen.cam_from_world[frame] = rotation;
+  }
+  return seen;
+}
+
+RotationRates RatesOf(const Orientations& orientations) {
+  return RatesOf(orientations.cam_from_world,
+                 [&](FrameId frame) { return orientations.timestamps_s[frame.value]; });
 }
 
 std::map<FrameId, double> OrientationSigmas(const Orientations& orientations) {

@@ -15,6 +15,7 @@
 #include "apps/slam/options.h"
 #include "rotodom/loop/looped_odometry.h"
 #include "rotodom/masks/static_content.h"
+#include "rotodom/motion_blur/keypoint_blur.h"
 #include "rotodom/sequence/frame_thumbnail.h"
 #include "rotodom/view_graph/fisheye_check.h"
 #include "rotodom/view_graph/zoom_check.h"
@@ -74,7 +75,7 @@ struct OrientationInputs {
   // Off: static content on the picture is tracked like the scene.
   bool find_static_content = true;
   StaticContent static_content;  // found before
-  // Ask the images whether the calibration is theirs (Orientations::fisheye, zooms).
+  // Check whether the calibration fits the images (Orientations::fisheye, zooms).
   bool check_lens = true;
 };
 
@@ -85,14 +86,25 @@ void InterpolateUnknown(const Orientations& orientations,
                         const std::set<FrameId>& unknown,
                         RotationMap& cam_from_world);
 
+/// Relative and absolute orientations as another lens would have shown them: the one that bundle
+/// adjustment has found. The result has only what frames between keyframes are registered with.
+/// @return  nullopt where they stay as they are: the lens of a calibration changes by less than
+///          orientations err, and given orientations do not depend on it.
+std::optional<Orientations> ThroughFoundLens(const Orientations& orientations,
+                                             const Camera& found,
+                                             const SlamOptions& options);
+
+/// Angular velocities of all frames.
+RotationRates RatesOf(const Orientations& orientations);
+
 /// Standard deviation of every orientation whose covariance is known, rad, relative to the first
 /// frame: the root of the mean variance about the three axes.
 std::map<FrameId, double> OrientationSigmas(const Orientations& orientations);
 
-/// Deviations of keyframes' orientations that a sensor ties to its own, rad, as priors for bundle
-/// adjustment: what the errors of all have in common counted in, and in the ratio to keypoints of
-/// one pixel that they have to the noise of the edges' matches. Empty without given orientations,
-/// and where these drift more than the images.
+/// Standard deviations of keyframes' orientations that a sensor gives, rad, as priors for bundle
+/// adjustment. They include the error that all share, and are scaled as if keypoints had a noise of
+/// one pixel, as adjustment assumes, instead of the noise of the edges' matches. Empty without
+/// given orientations, and where these drift more than the images.
 std::map<FrameId, double> SensorPriors(const Orientations& orientations,
                                        const std::set<FrameId>& keyframes);
 

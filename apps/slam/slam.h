@@ -26,7 +26,7 @@ struct SlamResult {
   MapResult map;  // empty where `orientations.interrupted`
 };
 
-/// Images that are reduced before anything is looked for in them.
+/// Images that are reduced before features are detected.
 struct ReducedInput {
   const WorkingSize& working;
   const Camera& camera;     // of the original images
@@ -45,7 +45,7 @@ void ToOriginalSize(const ReducedInput& input, MapResult& map);
 /// Runs the whole system, from frames and a calibrated camera to orientations, positions and
 /// points. Throws what FindOrientations throws. A sequence without a map is no error
 /// (MapResult::failure). Images larger than `options.max_image_side_px` are reduced; the result is
-/// of the original ones, while the observer sees what is worked with.
+/// of the original ones, while the observer gets the reduced ones.
 SlamResult RunSlam(FrameSource& frames,
                    const Camera& camera,
                    const SlamOptions& options,

@@ -10,7 +10,7 @@ namespace rotslam {
 /// One of the two blocks of LensParameters that bundle adjustment moves.
 using LensBlock = Eigen::Matrix<double, kLensBlockSize, 1>;
 
-/// (lens - expected) / sigma: what is known of the lens before the images are.
+/// (lens - expected) / sigma: the prior knowledge of the lens.
 class LensPriorCost final : public ceres::SizedCostFunction<kLensBlockSize, kLensBlockSize> {
  public:
   /// @param sigmas  positive.

@@ -10,7 +10,7 @@
 
 namespace rotslam {
 
-/// What a pixel does when the pose or the point moves by a little.
+/// Derivatives of a pixel by pose and point.
 struct ReprojectionJacobian {
   Eigen::Matrix<double, 2, 3> by_rotation;  // px per rad of delta, Exp(delta) * cam_from_world
   Eigen::Matrix<double, 2, 3> by_center;    // px per world unit
@@ -60,14 +60,14 @@ class TurnedRotation {
 /// Error: equals central differences to 1e-8 (ba tests).
 Eigen::Matrix3d LeftJacobian(const Eigen::Vector3d& rotation_vector);
 
-/// Which parameter blocks a camera has.
+/// The parameter blocks of a camera.
 enum class CameraLayout {
   kPose,    // turn and centre, one block of six: Ceres' specialised elimination
   kApart,   // turn (3), then centre (3), which frames can share
   kCenter,  // centre (3); the rotation is held
 };
 
-/// Which parameter blocks an observation has: those of the camera, the point (3), the lens (6
+/// The parameter blocks of an observation: those of the camera, the point (3), the lens (6
 /// each).
 struct ObservationForm {
   CameraLayout camera = CameraLayout::kPose;
@@ -79,13 +79,13 @@ struct ObservationForm {
   int num_lens_blocks = 0;
 };
 
-/// What a caller adds to a point between evaluations.
+/// A shift that a caller adds to a point between evaluations.
 struct PointShift {
   Eigen::Vector3d shift = Eigen::Vector3d::Zero();
   bool lost = false;  // not to be seen from anywhere
 };
 
-/// What a caller keeps as the parameters say (see ceres::EvaluationCallback), all of it to outlive
+/// State that a caller updates with the parameters (see ceres::EvaluationCallback). It must outlive
 /// the cost function.
 struct ReprojectionState {
   const Camera& camera;            // with the lens that the parameters say

@@ -13,14 +13,14 @@
 
 namespace rotslam {
 
-/// How well a minimum is known where nothing outside the state is: see BundleResult.
+/// Covariances of poses and lens at a minimum, as BundleResult has them.
 struct CameraCovariances {
   std::vector<std::optional<PoseCovariance>> poses;  // by frame of the state; nullopt: not in it
   std::optional<LensCovariance> lens;                // zero for blocks that are held
 };
 
 /// Covariances of the cameras at the minimum that `state` is; the arguments are Minimise's.
-/// @return  nullopt when the observations leave a camera open.
+/// @return  nullopt when the observations do not determine a camera.
 std::optional<CameraCovariances> FindCovariances(const Camera& calibrated,
                                                  const BundleRound& round,
                                                  bool refine_lens,

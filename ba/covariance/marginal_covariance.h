@@ -17,9 +17,9 @@ namespace rotslam {
 ///          when the residuals leave something open. Same bytes every time, which Ceres' own
 ///          covariance does not promise.
 /// Error:   equals the inverse of the whole J^T J to 1e-6 of its size (ba tests).
-/// Cost:    squared number of blocks in each eliminated block's residuals to assemble; then a
-/// sparse
-///          Cholesky of the remaining blocks and one solve per asked dimension.
+/// Cost:    squared number of blocks in each eliminated block's residuals to assemble;
+///          then a sparse Cholesky of the
+///          remaining blocks and one solve per asked dimension.
 std::optional<std::vector<Eigen::MatrixXd>> MarginalCovariances(
     ceres::Problem& problem,
     const std::vector<double*>& eliminated,

@@ -6,21 +6,21 @@
 
 namespace rotslam {
 
-/// Where classification looks for a track's position.
+/// The method by which classification finds a track's position.
 enum class Placement {
-  // From all observations and from pairs: what is found goes by where the cameras are, not by how
-  // they got there.
+  // From all observations and from pairs of them: the result depends on the poses alone, not on
+  // the position before.
   kAnywhere,
-  kNearby,  // from where it is, downhill
+  kNearby,  // descends from the position before
   // The same, and anywhere for a track that has not been placed yet.
   kWhereKnown,
   kStays,
 };
 
-/// Decides which observations fit, the cameras standing where they stand, and which tracks make a
-/// point or a direction; frames left with too few observations become weak.
-/// @param round          its limit, and its loss, by which positions are compared.
-/// @param placement      where a track's position is looked for.
+/// Decides which observations fit, with the cameras fixed, and which tracks make a point or a
+/// direction. Frames left with too few observations become weak.
+/// @param round          its threshold, and its loss, by which positions are compared.
+/// @param placement      how a track's position is found.
 void ClassifyAll(const BundleRound& round,
                  Placement placement,
                  const BundleOptions& options,
@@ -31,12 +31,12 @@ void ClassifyAll(const BundleRound& round,
 /// less three (a point) or two (a direction) to a track. 0 where there are none.
 double ResidualSpread(const BundleState& state);
 
-/// Whether the used observations err along their blurs as much more than across as these say:
-/// whether that is clearly likelier than that they err alike, by Laplace's distribution with its
+/// Whether the errors of the used observations are larger along their blurs than across, as the
+/// blurs say. It must be clearly likelier than equal errors, by Laplace's distribution with its
 /// width fitted to either.
 bool ShowsMotionBlur(const BundleState& state);
 
-/// What the points explain within the round's limit, the cameras standing where they stand.
+/// The observations that the points explain within the round's threshold, with the cameras fixed.
 BundleSupport SupportWithin(const BundleRound& round,
                             const BundleOptions& options,
                             BundleState state);

@@ -24,7 +24,7 @@
 
 namespace rotslam {
 
-/// What observations have in common, and stray points, follow the solver's numbers.
+/// Updates the values that observations share, and stray points, when the solver has moved.
 class Followers final : public ceres::EvaluationCallback, public ceres::IterationCallback {
  public:
   Followers(const BundleState& state, CameraBlocks& cameras, StrayPoints& strays)
@@ -57,7 +57,7 @@ class Followers final : public ceres::EvaluationCallback, public ceres::Iteratio
 /// The used observations as a Ceres problem over the state's own numbers.
 class AdjustmentProblem {
  public:
-  /// @param calibrated   the camera as it was given: what the lens is held to.
+  /// @param calibrated   the camera as it was given, to which priors hold the lens.
   /// @param round        its loss, and whether rotations move.
   /// @param refine_lens  as far as `options.lens` lets it.
   /// `calibrated` and `state` must outlive this.

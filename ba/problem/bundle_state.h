@@ -13,8 +13,8 @@
 
 namespace rotslam {
 
-// What RefineBundle works on: poses and tracks by index, one block per centre. Not for callers of
-// ba.
+// The working data of RefineBundle: poses and tracks by index, one block per centre. Not for
+// callers of ba.
 
 struct FrameState {
   FrameId id;
@@ -53,10 +53,10 @@ struct BundleState {
   std::vector<TrackState> tracks;
   // Whether keypoints are less certain along their blurs.
   bool has_motion_blur = false;
-  // Of what many observations tell of the lens, in their sigmas: what priors of the lens are
-  // weighed by (LensOptions::weighs_by_residuals).
+  // Noise of what many observations together tell of the lens, in their sigmas. It weighs the
+  // priors of the lens (LensOptions::weighs_by_residuals).
   double lens_noise = 1.0;
-  // Where tracks are that are not the problem's any more.
+  // Owns the tracks that have replaced those of the problem; null: none have.
   std::shared_ptr<const std::vector<Track>> replaced;
 };
 
@@ -65,7 +65,7 @@ struct BundleState {
 /// Throws std::invalid_argument where the contract of RefineBundle is broken.
 BundleState MakeBundleState(const BundleProblem& problem, const BundleOptions& options);
 
-/// Replaces those of the state's tracks that have the ids of `tracks`. Where they are stays.
+/// Replaces those of the state's tracks that have the ids of `tracks`. Their positions stay.
 void ReplaceTracks(std::vector<Track> tracks, int num_threads, BundleState& state);
 
 /// Sigmas per pixel: the inverse root of the keypoint's covariance.

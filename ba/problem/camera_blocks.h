@@ -21,7 +21,7 @@ class CameraBlocks {
   /// @param turns  whether rotations move.
   CameraBlocks(const BundleState& state, const Camera& calibrated, bool turns);
 
-  /// As the numbers say: what many observations have in common.
+  /// Computes the values that many observations share, for the present parameters.
   void Follow();
 
   CameraLayout layout() const { return layout_; }
@@ -45,7 +45,7 @@ class CameraBlocks {
   /// As of the last evaluation.
   const Camera& camera() const { return camera_; }
   const TurnedRotation& RotationOf(std::size_t frame) const { return rotations_[frame]; }
-  /// As the numbers say.
+  /// A frame's orientation for the present parameters.
   Rotation Turned(std::size_t frame) { return rotations_[frame].At(TurnOf(frame)); }
 
  private:

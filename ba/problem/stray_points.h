@@ -11,17 +11,17 @@
 
 namespace rotslam {
 
-/// Points while cameras and points move together. A step that is right for nearly all of them
-/// throws a few out of one, those with little parallax behind the cameras above all, and is
-/// refused for what these few cost; short steps that spare them hardly get on. Here such points are
-/// put where the cameras' new poses see them, before the step is judged.
+/// Keeps a few points from blocking the solver. A step that is right for nearly all points can
+/// throw a few far away, mostly points of little parallax behind the cameras. The solver would
+/// reject it for their cost, and the short steps that spare them make little progress. So such
+/// points are put where the cameras' new poses see them, before the step is judged.
 ///
-/// What is added to a point of the solver's is its shift; a point that no place is found for is
-/// lost until it is seen again. Both go with the solver's numbers: those of a refused step are
-/// forgotten.
+/// A stray point gets a shift, which is added to the solver's point; if no position is found, the
+/// point is lost until it is seen again. Both belong to a step of the solver: if the step is
+/// rejected, so are they.
 class StrayPoints {
  public:
-  /// Where a frame's camera stands in an evaluation.
+  /// The pose of a frame's camera in an evaluation.
   struct Pose {
     Eigen::Matrix3d R_c_w;
     Eigen::Vector3d center;
@@ -37,7 +37,7 @@ class StrayPoints {
   /// The solver tries the state's positions and these poses: shifts the points that see much worse
   /// than at the last accepted ones, where that helps.
   void Try(const std::vector<Pose>& poses);
-  /// What was tried is where the solver goes on from.
+  /// The solver has accepted the step that was evaluated last.
   void Accept();
 
   /// Of a track; stays where it is in memory.

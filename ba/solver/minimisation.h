@@ -17,7 +17,7 @@ struct MinimisationResult {
 
 /// Moves poses, points, directions and, where asked, the lens of `state` to a minimum of the used
 /// observations' robust cost.
-/// @param calibrated   the camera as it was given: what the lens is held to.
+/// @param calibrated   the camera as it was given, to which priors hold the lens.
 /// @param refine_lens  as far as `options.lens` lets it.
 /// @return  nullopt, and the state as it was, when no frame that may move sees a point.
 std::optional<MinimisationResult> Minimise(const Camera& calibrated,

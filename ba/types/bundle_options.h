@@ -21,8 +21,8 @@ enum class RobustLoss { kNone, kHuber, kCauchy };
 struct BundleRound {
   // Skip the round altogether.
   bool enabled = true;
-  // Whether rotations move. Held, they carry positions and points that are metres off to a place
-  // from where everything may move.
+  // Whether rotations move. With rotations held, positions and points that are metres off come near
+  // their places, from where everything may move.
   bool refine_rotations = true;
   // Observations farther than this from their point, as the cameras stand before the round, are
   // left out of it. For keypoints with sigma_px above 1 it grows with sigma_px. Zero: nothing is.
@@ -54,9 +54,9 @@ struct BundleRound {
 /// were independent: neighbouring observations err alike. On simulated walks and drives 2 to 5.
 inline constexpr double kCommonErrors = 4.0;
 
-/// How far the calibration is believed. It is a measurement too: what a calibration has left of a
-/// lens' distortion bends every track alike, and a long drive turns that into a drift of scale that
-/// no number of observations averages out.
+/// How far the calibration may change. It is a measurement, too: distortion that a calibration has
+/// left affects every track alike, and on a long drive becomes a drift of scale that no number of
+/// observations averages out.
 struct LensOptions {
   // The first two radial coefficients, or w of kFov; a pinhole becomes a radtan camera.
   bool refine_distortion = true;
@@ -77,7 +77,7 @@ struct LensOptions {
   // Of the tangential coefficients, as a share of that of the others: they trade with the principal
   // point, and lenses are centred to some seconds of arc.
   double tangential_share = 0.1;
-  // What the parameters are expected to be; none: those of the camera that adjustment starts from.
+  // Expected values of the parameters; none: those of the camera that adjustment starts from.
   std::optional<Camera> expected;
   // The deviations above are those of lenses as they are: they are weighed by how large the
   // residuals turn out, and errors that neighbouring observations have in common count in
@@ -117,27 +117,27 @@ struct LensOptions {
   }
 };
 
-/// Of bundle adjustment: its rounds, what it may move, and what it leaves out.
+/// Options of bundle adjustment: its rounds, the parameters that move, outlier thresholds.
 struct BundleOptions {
-  // From known-rotation positions, which are a few percent of the path length off, so that a tight
-  // test against them would throw away 5 to 10 % of the good observations: none is made. Outliers
-  // still in it keep the cost moving long after the cameras have arrived, hence the tolerance.
+  // Starts from known-rotation positions, which err by a few percent of the path length. A tight
+  // outlier test would drop 5 to 10 % of the good observations, so there is none. Outliers keep the
+  // cost changing long after the cameras have converged, hence the tolerance.
   BundleRound fixed_rotation = {
       .refine_rotations = false, .max_error_px = 0.0, .function_tolerance = 1e-3};
-  // What is within 4 px after the fixed-rotation stage, rotations free.
+  // Observations within 4 px after the fixed-rotation stage, rotations free.
   BundleRound coarse = {.max_error_px = 4.0};
-  // What is within 2 px of that. Steps are Gauss-Newton's nearly from the start: damping holds back
-  // what little there is left to correct, the long waves in which a way bends.
+  // Observations within 2 px after that. Steps are Gauss-Newton's nearly from the start: damping
+  // would hold back the small corrections that are left, slow bends of the path.
   BundleRound fine = {
       .max_error_px = 2.0, .max_iterations = 50, .initial_radius = 1e8, .function_tolerance = 1e-5};
-  // What comes before the final stage takes tracks at random until every frame has so many
-  // observations: enough to say where cameras are, at a third of the time; the final stage takes
-  // all. 0: all from the start. The longest tracks would do worse: they are those that the lens'
-  // errors and the tracker's drift bend most.
+  // The stages before the final one take tracks at random until every frame has so many
+  // observations: enough to place the cameras, at a third of the time; the final stage takes all.
+  // 0: all from the start. The longest tracks would do worse: errors of the lens and drift of the
+  // tracker affect them most.
   int preparing_observations = 300;
-  // Keypoints are often better than their sigma says, and what is far out for them are tracks that
-  // drift. So from the fine round on the loss leaves the quadratic at this many spreads of the
-  // residuals that the round before has left, and observations are kept within that many, where
+  // Keypoints are often better than their sigma says, and those that are far out then belong to
+  // tracks that drift. So from the fine round on the loss leaves the quadratic at this many spreads
+  // of the residuals of the round before, and observations within so many spreads are kept, where
   // that is less than the round allows. A spread is the median residual, in sigmas, freed of what
   // points take off by fitting, in steps of a quarter octave. On simulated walks and drives errors
   // fall to 0.3 to 0.9 of those with the round's own widths; where residuals are as wide as
@@ -146,15 +146,15 @@ struct BundleOptions {
   // 1.4 % off the cost of KITTI 00, with 2 and 6 spreads 3.8 %. 0: as the round has it.
   double loss_spreads = 3.0;
   double limit_spreads = 5.0;
-  // While a frame is exposed it turns, and what it sees is blurred along the motion: there its
-  // keypoints are less certain than across, by hypot(1, blur), which is this times the speed of
-  // the image, px/s. Where the coarse round's residuals clearly show that it counts from then on.
-  // Most likely by those of TUM fr1_rpy: 0.002, up to a blur of 1.4. 0: as certain in all
-  // directions.
+  // A frame that rotates while it is exposed is blurred along the motion. Its keypoints are less
+  // certain along the blur than across, by hypot(1, blur), where the blur is this times the speed
+  // of the image, px/s. It counts once the residuals of the coarse round clearly show it. Those of
+  // TUM fr1_rpy make 0.002 the most likely value, up to a blur of 1.4. 0: keypoints are as certain
+  // in all directions.
   double blur_s_per_px = 0.002;
-  // Closing is repeated, so many times at most, until classification changes next to nothing: then
-  // the result does not depend on where it started. 0: cameras stay where the rounds before have
-  // left them, and all tracks are triangulated once more.
+  // The final stage is repeated at most so many times, until classification hardly changes: then
+  // the result does not depend on the start. 0: cameras stay as the rounds before have left them,
+  // and all tracks are triangulated once more.
   int max_final_rounds = 5;
   // false holds the rotations in every round: they come out bit by bit as they went in.
   bool refine_rotations = true;
@@ -162,7 +162,7 @@ struct BundleOptions {
   // Whether the result says how well each pose, and a refined lens, is known; a seventh of the time
   // more on KITTI 00.
   bool find_covariance = false;
-  // Whether it says how well a refined lens is known; a hundredth.
+  // Whether the result says how well a refined lens is known; a hundredth of the time more.
   bool find_lens_covariance = false;
 
   // A point needs two rays that meet at this angle, else its depth is noise. Low on purpose: a

@@ -8,15 +8,15 @@
 
 namespace rotslam {
 
-/// What to refine. All frames share one camera.
+/// The map to refine. All frames share one camera.
 struct BundleProblem {
   Camera camera;
   /// Poses in any gauge, and tracks with observations in pixels; bearings are the camera's of
   /// these. Its points are not looked at: all are triangulated. Observations in frames without a
   /// pose are left out.
   Reconstruction start;
-  /// Frame -> frame at whose place it stands. Through a pure rotation there is one centre, so there
-  /// is one parameter block: positions come out equal to the last bit. Chains are followed.
+  /// Frame -> frame whose centre it shares. A pure rotation has one centre, and so one parameter
+  /// block: the positions in the result are equal to the last bit. Chains are followed.
   std::map<FrameId, FrameId> shared_center;
   /// Frames whose pose does not move: the older side of a window. When empty, the first frame is
   /// held and the scale stays.

@@ -55,9 +55,9 @@ struct BundleRoundSummary {
   double solver_seconds = 0.0;  // Ceres alone, on the problem as it has been built
 };
 
-/// What points explain within the fine round's limit, however narrow the last round was, of the
-/// observations given, not those that completion has found: of two models of a sequence both are
-/// asked the same.
+/// The observations that points explain within the fine round's threshold, whatever that of the
+/// last round was. It counts the observations given, not those that completion has added, so that
+/// two models of a sequence can be compared.
 struct BundleSupport {
   int num_frames = 0;
   int num_points = 0;
@@ -79,7 +79,7 @@ struct BundleSummary {
   int num_completed = 0;             // observations that completion has added
   int num_dropped_tracks = 0;        // of the tracks given
   int num_dropped_observations = 0;  // of those given or added, dropped tracks' included
-  // Whether keypoints turned out less certain along their blurs, and counted so.
+  // Whether keypoints were found less certain along their blurs, and were weighted so.
   bool has_motion_blur = false;
   double lens_gain = 0.0;     // share of the cost that another lens took off, see LensOptions
   bool lens_refined = false;  // whether that was enough
@@ -93,14 +93,14 @@ struct BundleSummary {
   std::vector<BundleRoundSummary> rounds;
 };
 
-/// What bundle adjustment gives, usable or not.
+/// The result of bundle adjustment, usable or not.
 struct BundleResult {
   BundleStatus status = BundleStatus::kNotRun;
   std::string message;  // one sentence for a person
   /// Poses, points, and tracks with only the observations that fit them. Every track in it has a
-  /// point. A frame that is left without observations has neither rotation nor centre, for what led
-  /// it to where it is does not fit: resect or interpolate it. One that sees directions alone has
-  /// its rotation. The start, unchanged, when not usable.
+  /// point. A frame that is left without observations has neither rotation nor centre, since those
+  /// that placed it do not fit: resect or interpolate it. A frame that sees directions alone has a
+  /// rotation. The start, unchanged, when not usable.
   Reconstruction reconstruction;
   /// The camera with its lens refined; the bearings in `reconstruction` are its.
   Camera camera;

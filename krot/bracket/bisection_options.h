@@ -8,7 +8,7 @@
 
 namespace rotslam {
 
-/// How far a search is.
+/// Progress of a search.
 struct BisectionProgress {
   double gamma_low = 0.0;
   double gamma_high = kInfinity;
@@ -16,7 +16,7 @@ struct BisectionProgress {
   int num_points = 0;  // in the program just solved
 };
 
-/// By which programs the bracket is narrowed.
+/// The programs that narrow the bracket.
 enum class BisectionMethod {
   // Our own interior-point programs over the few points that hold the optimum, the LP engine where
   // they stall.

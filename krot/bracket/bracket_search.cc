@@ -59,6 +59,8 @@ double ScaleBetween(const std::vector<Eigen::Vector3d>& from,
 
 // Alternates programs over the working set with triangulation of all other points. A program of the
 // set proves lower bounds for all; upper bounds are of all points by construction.
+// The class is longer than others: every step reads and moves the target, the bracket and both
+// structures, so that parts of it could only share all of these.
 class Search {
  public:
   Search(const MinimaxProblem& problem,

@@ -5,7 +5,7 @@
 
 namespace rotslam {
 
-/// What the search for one connected part of a problem knows.
+/// The bracket of one connected component of a problem, and the state of its search.
 struct Bracket {
   BisectionStatus status = BisectionStatus::kSolverFailed;
   MinimaxStructure structure;
@@ -18,7 +18,7 @@ struct Bracket {
 
 /// When a search ends before its bracket is narrow.
 struct SearchLimits {
-  // Below this the rest of the problem decides.
+  // The bracket need not be narrowed below this: another component has a larger residual.
   double gamma_of_others = 0.0;
   int max_programs = 0;
   bool only_feasible = false;  // any structure will do

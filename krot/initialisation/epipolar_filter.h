@@ -9,7 +9,7 @@
 
 namespace rotslam {
 
-/// Which observations fail the epipolar test, and which pairs of views make it.
+/// The epipolar test of observations, and the pairs of views that it uses.
 struct EpipolarFilterOptions {
   double threshold_rad = 0.0057;  // angle between a ray and the epipolar plane; 4 px at f = 700
   int max_samples = 100;          // two-track samples per pair of views

@@ -9,7 +9,7 @@
 
 namespace rotslam {
 
-/// When a view or a point can be placed from what is known.
+/// When a view or a point can be placed from known points or views.
 struct RegistrationOptions {
   CenterResectionOptions resection;
   // A view is placed when it sees this many known points and as many agree on its position.

@@ -7,7 +7,7 @@
 
 namespace rotslam {
 
-/// Which tracks the linear programs get to see.
+/// Selects the tracks that enter the linear programs.
 struct SelectionOptions {
   // Observations each view should have in the linear programs. 40 well spread ones hold a view as
   // firmly as all.

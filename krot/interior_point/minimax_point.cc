@@ -301,15 +301,6 @@ AffineProjection ProjectionOfPoint(const Eigen::Matrix3d& R_c_w,
   return projection;
 }
 
-AffineProjection ProjectionFromCenter(const Eigen::Matrix3d& R_c_w,
-                                      const Eigen::Vector3d& point_in_world,
-                                      const Eigen::Vector2d& xy) {
-  AffineProjection projection = ProjectionOfPoint(R_c_w, point_in_world, xy);
-  projection.A = -projection.A;
-  projection.b = -projection.b;
-  return projection;
-}
-
 double MaxPointResidual(std::span<const AffineProjection> projections,
                         const Eigen::Vector3d& position) {
   double largest = 0.0;

@@ -16,15 +16,10 @@ struct AffineProjection {
   Eigen::Vector3d b;
 };
 
-/// Of an unknown point u, from a known centre and rotation.
+/// The projection of an unknown point u into a view of known centre and rotation.
 AffineProjection ProjectionOfPoint(const Eigen::Matrix3d& R_c_w,
                                    const Eigen::Vector3d& center_in_world,
                                    const Eigen::Vector2d& xy);
-/// Of a known point, from an unknown centre u with known rotation.
-AffineProjection ProjectionFromCenter(const Eigen::Matrix3d& R_c_w,
-                                      const Eigen::Vector3d& point_in_world,
-                                      const Eigen::Vector2d& xy);
-
 /// How closely the least largest residual of one point is bracketed.
 struct MinimaxPointOptions {
   // Stop when the bracket is this narrow relative to its upper end. Lower bounds closer than 1e-6

@@ -37,7 +37,7 @@ struct LinearProgram {
 
 /// How the call went, whatever the program is like.
 enum class LpCallStatus { kNotRun, kCompleted, kFailed };
-/// What the engine says of the program. Claims only: whoever needs a proof checks it.
+/// The engine's verdict on the program. It is a claim: whoever needs a proof checks it.
 enum class LpModelStatus { kUnknown, kOptimal, kInfeasible, kUnbounded, kIterationLimit };
 
 enum class LpMethod { kInteriorPoint, kDualSimplex };
@@ -45,7 +45,7 @@ enum class LpMethod { kInteriorPoint, kDualSimplex };
 // GPL, and a build may leave it out.
 enum class LpEngine { kClp, kGlpk };
 
-/// Which engine solves a linear program, how, and how long it may take.
+/// The engine for a linear program, its method and its limits.
 struct LpOptions {
   LpEngine engine = LpEngine::kClp;
   // Interior point: ends with a point inside the optimal face, without clean-up by simplex. Made

@@ -9,14 +9,14 @@
 
 namespace rotslam {
 
-/// Which pairs of images a COLMAP database gets.
+/// The pairs of images that a COLMAP database gets.
 struct ColmapDatabaseOptions {
   // Pairs of images with fewer common tracks are left out: COLMAP does not look at them either
   // (its min_num_matches).
   int min_matches = 15;
   // A match belongs to its pair's geometry up to this distance from the epipolar line that the
   // poses draw, or, without a baseline, from where the turn puts it; pixels near the image centre.
-  // What COLMAP's own verification allows.
+  // The threshold of COLMAP's own verification.
   double max_error_px = 4.0;
 
   std::optional<std::string> Problem() const;

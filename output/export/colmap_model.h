@@ -25,7 +25,7 @@ struct ColmapModel {
   Camera camera;
   Reconstruction reconstruction;
   std::map<FrameId, std::string> image_name;
-  // What it takes to write the model again.
+  // The data needed to write the model again.
   std::map<std::int64_t, Camera> cameras;  // by id
   std::map<FrameId, ColmapImage> images;
   std::map<TrackId, std::uint64_t> point_id;
@@ -69,7 +69,7 @@ enum class ColmapForm { kBinary, kText };
 /// Throws std::runtime_error when a file cannot be written.
 void WriteColmapModel(const std::filesystem::path& folder, const RunMap& map, ColmapForm form);
 
-/// What COLMAP's model_analyzer says of a model.
+/// The figures that COLMAP's model_analyzer gives for a model.
 struct ColmapFigures {
   int num_images = 0;
   int num_points = 0;
@@ -78,7 +78,7 @@ struct ColmapFigures {
   int num_seen = 0;            // of these
 };
 
-/// Of poses and points in the frames and tracks of `model`, by the images' own cameras.
+/// The figures for poses and points in the frames and tracks of `model`, by the images' cameras.
 ColmapFigures FiguresOf(const ColmapModel& model, const Reconstruction& map);
 
 /// Writes a model that has been solved anew: ids, names, keypoints and cameras are those of

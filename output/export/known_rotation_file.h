@@ -13,7 +13,7 @@
 
 namespace rotslam {
 
-/// What a known-rotation problem is made of.
+/// The parts of a known-rotation problem.
 struct KnownRotationInput {
   std::string format;  // "rotslam", "COLMAP" or "BAL", for messages
   Camera camera;
@@ -21,7 +21,7 @@ struct KnownRotationInput {
   std::map<FrameId, double> timestamp_s;  // where the file has them
   std::map<FrameId, double> sigma_rad;    // standard deviations of the orientations, where known
   std::vector<Track> tracks;
-  // What the file calls views and tracks, where that is not their number here.
+  // The names of views and tracks in the file, where these are not their numbers here.
   std::map<FrameId, std::string> view_name;
   std::map<TrackId, std::string> track_name;
   std::vector<std::string> notes;             // what was merged or left out, one line each

@@ -9,7 +9,7 @@
 
 namespace rotslam {
 
-/// Which part of a journal counts: what was appended behind it is taken for never written.
+/// The valid part of a journal: records appended behind it count as never written.
 struct JournalExtent {
   std::uint64_t num_records = 0;
   std::uint64_t num_bytes = 0;

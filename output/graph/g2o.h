@@ -7,7 +7,7 @@
 
 namespace rotslam {
 
-/// What a g2o file with SE(3) vertices says about rotations.
+/// The rotations of a g2o file with SE(3) vertices.
 struct PoseGraph {
   ViewGraph graph;
   RotationMap cam_from_world;

@@ -15,7 +15,7 @@ struct EdgeReading {
   bool has_y_up = false;         // cameras have y up and z backward, as Bundler's
 };
 
-/// Which reading the edges are in.
+/// The reading that was chosen.
 struct EdgeChoice {
   std::size_t reading = 0;
   std::string note;  // one line: what was chosen and what cycles say of it

@@ -23,7 +23,7 @@ struct RotationGraphInput {
   std::vector<std::string> notes;
 };
 
-/// One form of files with relative rotations. A new form is one file in output/graph_forms.
+/// One form of files with relative rotations. A new form is one file in output/graph/forms.
 struct RotationGraphForm {
   std::string name;         // "g2o"
   std::string description;  // one line for the documentation and --help
@@ -91,7 +91,7 @@ class RotationGraphBuilder {
                const std::string& j,
                const Rotation& j_from_i,
                const Eigen::Matrix3d& covariance);
-  /// What the last edge says beside its rotation.
+  /// The numbers of the last edge beside its rotation.
   void AddTranslation(const EdgeTranslation& translation);
   void AddVertex(const std::string& id,
                  const Rotation& cam_from_world,

@@ -8,7 +8,7 @@
 
 namespace rotslam {
 
-/// What an edge of a pose graph says beside its rotation.
+/// The numbers of an edge of a pose graph beside its rotation.
 struct EdgeTranslation {
   Eigen::Vector3d j_in_i = Eigen::Vector3d::Zero();  // view j's position in the frame of view i
   // As g2o has it: translation first, then the quaternion's vector part.

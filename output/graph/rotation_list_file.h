@@ -10,8 +10,8 @@
 
 namespace rotslam {
 
-/// Reads rotations to average in any of the forms of output/rotation_graph_form.h, told apart by
-/// the first line:
+/// Reads rotations to average in any of the forms of output/graph/rotation_graph_form.h, told apart
+/// by the first line:
 /// - `VERTEX_SE3:QUAT id x y z qx qy qz qw`, `EDGE_SE3:QUAT i j x y z qx qy qz qw` and the upper
 ///   triangle of the information, `FIX id ...`, as ReadG2o takes them;
 /// - `VERTEX3 id x y z roll pitch yaw`, `EDGE3 i j x y z roll pitch yaw` and the upper triangle of
@@ -39,7 +39,7 @@ std::optional<std::string> RecogniseRotationList(const std::filesystem::path& pa
 /// Throws std::runtime_error with file, line and reason, or the view that has no orientation there.
 RotationMap ReadStartOrientations(const std::filesystem::path& path, const RotationList& list);
 
-/// What is written of a graph whose orientations have been averaged.
+/// A graph whose orientations have been averaged, as it is written.
 struct AveragedGraph {
   RotationMap cam_from_world;  // views without one are left out, and their edges
   CenterMap center_in_world;   // of a pose graph's vertices; those without one are at the origin

@@ -237,8 +237,6 @@ std::set<FrameId> KeyframesOf(const RunMap& map) {
   return keyframes;
 }
 
-RunMap KeyframesOnly(const RunMap& map) { return PartOf(map, KeyframesOf(map)); }
-
 Reconstruction ToReconstruction(const RunMap& map) {
   Reconstruction reconstruction;
   for (const MapFrame& frame : map.frames) {

@@ -40,7 +40,7 @@ struct MapEdge {
   bool rotation_only = false;
 };
 
-/// What a run leaves for other systems to start from.
+/// The map of a run, from which other systems can start.
 struct RunMap {
   Camera camera;             // refined; keypoints are pixels of its distorted image
   std::string image_folder;  // of the images; for a video, the file
@@ -55,18 +55,17 @@ struct RunMap {
 
 /// Puts tracks and what was made of them together; levels are all 0.
 /// @param tracks  all sightings.
-/// @param solved  its tracks hold the sightings that fit, which stand in for those given of the
-/// same
-///                track and frame; only tracks with a point count.
+/// @param solved  its tracks hold the sightings that fit, which replace those given of the same
+///                track and
+///                frame; only tracks with a point count.
 std::vector<MapTrack> JoinTracks(const std::vector<Track>& tracks, const Reconstruction& solved);
 
 /// The part of a map that has only `frames`: the other frames are left out, and their sightings,
 /// tracks without any sighting left, and edges at them.
 RunMap PartOf(const RunMap& map, const std::set<FrameId>& frames);
 
-/// The keyframes of a map, and the part of it that has only them.
+/// The keyframes of a map.
 std::set<FrameId> KeyframesOf(const RunMap& map);
-RunMap KeyframesOnly(const RunMap& map);
 
 /// Points, and the sightings that fit, of the frames in the map.
 Reconstruction ToReconstruction(const RunMap& map);

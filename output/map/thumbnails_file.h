@@ -6,7 +6,7 @@
 
 namespace rotslam {
 
-/// What the frames of a run looked like, small.
+/// Small images of the frames of a run.
 struct ThumbnailTable {
   int width = 0;
   int height = 0;

@@ -13,7 +13,7 @@ struct LoopRow {
   int inliers = 0;         // matches that agree with the relative rotation
   double angle_deg = 0.0;  // of the rotation around the loop, before it was closed
   bool accepted = false;
-  // What all turns of the way in between are scaled by to fit best, and what is left of the angle.
+  // The factor of all rotations in between with which the loop closes best, and the angle left.
   double turn_scale = 1.0;
   double scaled_angle_deg = 0.0;
   int edges = 0;  // of the view-graph that come of it

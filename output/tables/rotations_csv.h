@@ -11,7 +11,7 @@
 
 namespace rotslam {
 
-/// What is known of one frame's orientation.
+/// One frame's orientation, and how well it is known.
 struct RotationRow {
   int frame = 0;
   double timestamp_s = 0.0;

@@ -20,7 +20,7 @@ namespace rotslam {
 using SummaryValue = std::variant<bool, std::int64_t, double, std::string>;
 using SummaryTable = std::vector<std::pair<std::string, SummaryValue>>;
 
-/// What krot proved. gamma is in normalised image units, gamma_px in pixels.
+/// The bracket that krot proved. gamma is in normalised image units, gamma_px in pixels.
 struct SummaryKrot {
   std::string status;
   double gamma_low = 0.0;

@@ -8,7 +8,7 @@
 
 namespace rotslam {
 
-/// What a file says of orientations.
+/// The orientations of a file.
 struct OrientationFile {
   std::vector<StampedRotation> orientations;  // ascending in time, no time twice
   std::string form;                           // the form that the file was taken for

@@ -7,7 +7,7 @@
 
 namespace rotslam {
 
-/// What a file of poses says.
+/// The poses of a file.
 struct TrajectoryFile {
   Trajectory poses;                // ascending in time, no time twice
   std::string form;                // the form that it was taken for: "TUM"

@@ -49,7 +49,7 @@ TrajectoryInput ReadTrajectoryInput(const std::filesystem::path& path);
 /// Whether a word stands for a number that is not there: "nan", "-inf", "null".
 bool IsMissingNumber(const std::string& word);
 
-/// Where a pose is in a line. Without positions these are -1.
+/// The columns of a pose in a line. Without positions these are -1.
 struct PoseColumns {
   int time = 0;
   std::array<int, 3> position = {1, 2, 3};

@@ -11,7 +11,7 @@
 
 namespace rotslam {
 
-/// Which orientations are averaged after a new frame.
+/// The orientations that are averaged after a new frame.
 enum class AveragingMode {
   kOff,     // none: every orientation is chained to its best edge
   kWindow,  // the newest `window`, older ones are fixed: constant time
@@ -20,9 +20,9 @@ enum class AveragingMode {
 /// The words for them in option files: "off", "window", "global".
 std::span<const char* const> OptionWords(AveragingMode);
 
-/// Of averaging over a window or a small view-graph.
+/// Options of averaging over a window or a small view-graph.
 struct AveragingOptions {
-  // What is averaged at every frame.
+  // The orientations that are averaged at every frame.
   AveragingMode mode = AveragingMode::kWindow;
   // Newest orientations that stay free in the incremental solve; the paper's |R|.
   int window = 10;

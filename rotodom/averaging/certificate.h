@@ -24,7 +24,7 @@ struct AveragingCertificate {
   double RelativeGap() const { return cost > 0.0 ? (cost - cost_bound) / cost : 0.0; }
 };
 
-/// What is told while a certificate is computed.
+/// Progress of the computation of a certificate.
 struct CertificateProgress {
   double entries = 0.0;    // of one factorisation
   double products = 0.0;   // multiplications of one

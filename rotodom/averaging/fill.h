@@ -4,7 +4,7 @@
 
 namespace rotslam {
 
-/// What a Cholesky factorisation costs, without doing it.
+/// The cost of a Cholesky factorisation, counted without doing it.
 struct CholeskyFill {
   double entries = 0.0;      // below the factor's diagonal
   double products = 0.0;     // multiplications, about: the sum of the columns' squared counts

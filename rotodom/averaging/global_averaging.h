@@ -14,7 +14,7 @@
 
 namespace rotslam {
 
-/// Of averaging over a whole view-graph, wrong edges among it.
+/// Options of averaging over a whole view-graph that has wrong edges.
 struct GlobalAveragingOptions {
   // Standard deviation added to every edge's covariance, so that no edge is believed without limit.
   double edge_floor_deg = 0.001;

@@ -79,7 +79,7 @@ struct Camera {
   /// Pixels per radian near the image centre: the mean of fx and fy.
   double MeanFocal() const { return 0.5 * (fx + fy); }
 
-  /// What is wrong with the numbers, in one line; nullopt when all is well.
+  /// The first problem with the numbers, in one line; nullopt when all is well.
   std::optional<std::string> Problem() const;
 
   bool operator==(const Camera&) const = default;

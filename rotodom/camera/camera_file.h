@@ -28,7 +28,7 @@ struct NamedCamera {
   std::vector<std::vector<Eigen::Vector2d>> masked_px = {};
 };
 
-/// What a calibration file says.
+/// The content of a calibration file.
 struct CameraFile {
   std::string form;                  // name of the form that it was taken for: "ORB-SLAM YAML"
   std::vector<NamedCamera> cameras;  // at least one, in the order of the file

@@ -26,18 +26,18 @@ namespace rotslam {
 ///   cx: 367.215
 ///   cy: 248.375
 ///   distortion: [-0.283, 0.074, 0.00019, 1.8e-05, 0]  # as DistortionNames(model) says
-///   readout_s: 0.02                  # rolling shutter, first row to last; 0: global; left out:
-///   not
-///                                    # known, and 0
+///   readout_s: 0.02                  # rolling shutter, first row to last; 0: global;
+///                                    # left out: not known, and 0
 ///   readout_from: top                # its first row: top, bottom, left or right; left out: top
-///   sigma_focal_px: 0.4              # standard deviations, of fx and fy together; left out:
-///   nobody sigma_cx_px: 0.5                 # knows, as for all other forms; all of them or none,
-///   0: exact sigma_cy_px: 0.6 sigma_distortion: [0.001, 0.002, 0.0001, 0.0001, 0.002]  # of the
-///   first coefficients, five at
-///                                    # most; five of a pinhole's, those of radtan
-///   masked_px: [[[0, 400], [752, 400], [752, 480], [0, 480]]]  # polygons of corners x, y: parts
-///   of
-///                                    # the image to be ignored (a bonnet, a mount); left out: none
+///   # Standard deviations, all of them or none. 0: exact; left out: not known.
+///   sigma_focal_px: 0.4              # of fx and fy together
+///   sigma_cx_px: 0.5
+///   sigma_cy_px: 0.6
+///   # Of the first coefficients, five at most; of a pinhole those of radtan.
+///   sigma_distortion: [0.001, 0.002, 0.0001, 0.0001, 0.002]
+///   # Polygons of corners x, y: parts of the image to be ignored (a bonnet, a mount); left out:
+///   # none.
+///   masked_px: [[[0, 400], [752, 400], [752, 480], [0, 480]]]
 /// radtan may leave k3 out; pinhole has no distortion. Unknown keys are errors.
 ///
 /// Throws std::runtime_error in one line, "file:line: key is 'x', must be ...": no such file, no

@@ -19,7 +19,7 @@
 
 namespace rotslam {
 
-/// Of loop closure: the candidates, their verification, and what the loops do to the averaging.
+/// Options of loop closure: candidates, their verification, and averaging after loops.
 struct LoopOptions {
   // Look for places seen before; what is remembered then grows with the sequence.
   bool use_loops = true;

@@ -16,7 +16,7 @@
 
 namespace rotslam {
 
-/// What proves that a candidate is the same place.
+/// Tests that a candidate passes to count as the same place.
 struct VerificationOptions {
   // An edge back to an older place needs this many matches that agree, and this share of all that
   // look alike. Of wrong places' matches chance makes up to a third agree.

@@ -77,7 +77,7 @@ struct VocabularyTree {
 /// Visual words: a hierarchical clustering of 256-bit descriptors whose leaves are the words,
 /// numbered by ascending node id.
 /// Source:  Nister & Stewenius, Scalable Recognition with a Vocabulary Tree, CVPR 2006;
-/// Galvez-Lopez
+///          Galvez-Lopez
 ///          & Tardos, Bags of Binary Words, T-RO 2012. Words, weights, scores (L1_NORM) and node
 ///          ids are those of DBoW2 for the same file. Where a branch ends above the level asked
 ///          for, DBoW2 leaves the node of the direct index undefined; ours is the leaf.

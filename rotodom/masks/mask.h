@@ -62,7 +62,7 @@ class Mask {
   cv::Mat distance_px_;  // from each pixel to the nearest masked one, 8-bit, at most 255
 };
 
-/// What either of the two masks. Throws std::invalid_argument where their sizes differ.
+/// Masks what either of two masks does. Throws std::invalid_argument where their sizes differ.
 Mask Union(const Mask& a, const Mask& b);
 
 /// Masks the inside of polygons.

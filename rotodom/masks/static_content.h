@@ -9,7 +9,7 @@
 
 namespace rotslam {
 
-/// What the parts of the picture that never move tell about the camera.
+/// The kinds of static content: parts of the picture that never move.
 enum class StaticContentKind {
   kNone,       // nothing stands still, or everything does
   kOnPicture,  // text, drops, dirt, a border: on the lens or the picture, in front of a scene
@@ -47,9 +47,9 @@ class StaticContentFinder {
   /// last time. kStanding concerns these frames only: a camera that stands may
   /// move later.
   /// @param has_rotated  whether the camera is known to have rotated by some degrees. Otherwise
-  /// what
-  ///                     is far away stands still, too, and much more must do so; an estimate that
-  ///                     follows the static content says false.
+  ///                     distant parts of the scene stand still, too, so that more evidence is
+  ///                     needed; orientations that follow the static content themselves give
+  ///                     false.
   /// Cost: about 2 ms per kept frame; next to nothing where few are new.
   StaticContent Find(bool has_rotated);
 

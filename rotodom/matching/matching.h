@@ -12,7 +12,7 @@
 
 namespace rotslam {
 
-/// Where matches are looked for, and what counts as one.
+/// Where matches are searched, and the tests that they pass.
 struct MatchingOptions {
   // Search radius around the position that the predicted rotation gives, for neighbouring frames;
   // it has room for the flow of the translation. Widened when too few matches are found.

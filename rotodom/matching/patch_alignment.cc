@@ -42,7 +42,8 @@ const PatchLoops& BestPatchLoops() {
 
 namespace {
 
-// Copies the pixels around a patch; the first one is (x, y).
+// Copies the pixels around a patch; the first one is (x, y). Six parameters: it runs for every
+// patch, and a struct of them would be built for this call alone.
 // @return  false when they leave the image.
 bool LoadWindow(
     const PatchLoops& loops, const cv::Mat& image, int x, int y, int side, PatchWindow& window) {

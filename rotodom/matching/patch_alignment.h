@@ -37,7 +37,7 @@ class PatchTemplate {
   Eigen::Vector2f gradient_share_;
 };
 
-/// Where a patch was found.
+/// The position of a patch in the other image, and how well it fits there.
 struct PatchAlignment {
   Eigen::Vector2d center_px;
   double correlation = 0.0;    // zero-mean normalised, 1 is a perfect match

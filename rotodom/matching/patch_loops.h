@@ -32,7 +32,7 @@ struct PixelWeights {
   float w00, w10, w01, w11;
 };
 
-/// What PatchLoops::prepare removed from a patch, and the sums over what is left.
+/// The values that PatchLoops::prepare subtracts from a patch, and sums over the remainder.
 struct PatchMoments {
   float energy;  // sum of the squared values, their mean removed
   float mean_x, mean_y;

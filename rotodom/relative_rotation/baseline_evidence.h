@@ -10,7 +10,7 @@
 
 namespace rotslam {
 
-/// Of the test whether the camera has moved between two views.
+/// Options of the test whether the camera has moved between two views.
 struct BaselineTestOptions {
   // Of two views from one place, this share passes for views from two, at most. A smaller one asks
   // for a longer baseline.

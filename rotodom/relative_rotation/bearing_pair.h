@@ -38,7 +38,7 @@ Eigen::Matrix2d TangentCovariance(const Eigen::Vector3d& bearing,
                                   const Eigen::Matrix2d& image_covariance);
 
 /// Covariance of the difference of R f_i and f_j, bearings of one point in two images: for
-/// MatchNoise::covariance_j, with variance_i = 0.
+/// MatchNoise::covariance_j, with variance_i = 0. Six parameters: the symbols of the formula.
 /// @param image_covariance_i, image_covariance_j  covariances of its two image positions.
 /// @param basis_j  two orthonormal vectors perpendicular to bearing_j, as columns; those of
 ///                 TangentBasis for a MatchNoise.

@@ -7,7 +7,7 @@
 
 namespace rotslam {
 
-/// Of the relative rotation of one pair of views.
+/// Options of the relative rotation of one pair of views.
 struct RelativeRotationOptions {
   // A match counts for a hypothesis while its Sampson distance is below this; larger values let
   // wrong matches vote.

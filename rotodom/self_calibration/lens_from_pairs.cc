@@ -130,6 +130,8 @@ struct PairNormal {
   }
 };
 
+// Six parameters: a pair with its pose, two cameras and two thresholds; each call has others of
+// them.
 PairNormal Linearize(const LensPair& pair,
                      const PairPose& pose,
                      const Camera& camera,

@@ -21,7 +21,7 @@ struct LensPair {
   std::vector<SharedPoint> points;  // with outliers
 };
 
-/// What is known of a lens before the images are asked.
+/// Prior knowledge of a lens.
 struct LensPrior {
   Camera camera;          // expected
   LensParameters sigmas;  // standard deviations of its parameters; 0: held

@@ -31,7 +31,7 @@ class OrientationPairing {
   /// frames.
   std::vector<OrientationPair> At(double offset_s) const;
 
-  /// What the sensor says at a time of its own clock, interpolated over the largest gap allowed.
+  /// The sensor's orientation at a time of its clock, interpolated over the largest gap allowed.
   std::optional<Rotation> SensorAt(double timestamp_s) const {
     return sparse_.AverageAt(timestamp_s, half_window_s_);
   }

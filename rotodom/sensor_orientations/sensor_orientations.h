@@ -24,8 +24,8 @@ struct SensorFusion {
   // with the alignment estimated.
   double disagreement_rad = 0.0;
   double aligned_disagreement_rad = 0.0;
-  // What the sensor's orientations are worth, from their agreement with the images: a deviation
-  // about an axis of each by itself, rad, and of their drift from one frame to the next.
+  // Standard deviations of the sensor's orientations, from their agreement with the images: of each
+  // about an axis, rad, and of their drift from one frame to the next.
   double sigma_rad = 0.0;
   double drift_rad = 0.0;
   bool drifts_less = false;  // than the images do, by the medians of the steps

@@ -24,8 +24,8 @@ struct ImageOrientations {
 
 /// How a sensor sits in time and on the camera.
 struct SensorAlignment {
-  // What the sensor writes at time t was so at t - offset_s of the images' clock: positive where it
-  // is late.
+  // The sensor's orientation at its time t belongs to time t - offset_s of the images: positive if
+  // the sensor is late.
   double offset_s = 0.0;
   double offset_sigma_s = 0.0;
   Rotation cam_from_sensor;

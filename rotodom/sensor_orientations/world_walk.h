@@ -40,7 +40,7 @@ class WorldWalk {
   const std::vector<FrameChain>& chains() const { return chains_; }  // those with pairs
   const Eigen::MatrixXd& vectors() const { return vectors_; }        // m x 3, m pairs
 
-  /// What the sensor is worth: the mean squared change of y over 1, 2, 4 ... pairs, less what the
+  /// The sensor's noise: the mean squared change of y over 1, 2, 4 ... pairs, less what the
   /// walk of the images accounts for.
   SensorNoise Noise() const;
 

@@ -15,7 +15,7 @@
 
 namespace rotslam {
 
-/// Which frames of a sequence to read, and when they were taken if nothing else says so.
+/// Selects the frames of a sequence, and gives their rate if the input has no times.
 struct SequenceOptions {
   // Number of the first input frame to use; the sequence's own first frame is 0.
   int first = 0;
@@ -82,14 +82,14 @@ class Sequence {
   /// Name of the form that the input was taken for: "EuRoC ASL", "image folder", "video".
   const std::string& form() const { return form_; }
 
-  /// Where the times come from, a short phrase: "times.txt", "file names (ns since 1970)".
+  /// The source of the times, a short phrase: "times.txt", "file names (ns since 1970)".
   const std::string& times_source() const { return times_source_; }
 
   /// True when frames are numbered and SequenceOptions::fps, or a rate that the input says, is
   /// believed.
   bool times_are_made_up() const { return times_are_made_up_; }
 
-  /// What was assumed, left out or ignored; one line each. A video may add some at its end.
+  /// Assumptions made and files ignored, one line each. A video may add some at its end.
   const std::vector<std::string>& notes() const { return notes_; }
 
   /// The side of the images that the sensor's first row is on, where the input tells: a video turns

@@ -31,7 +31,7 @@ struct PixelScale {
 /// holds all pixels but one in a thousand at either end.
 PixelScale FindPixelScale(const std::vector<cv::Mat>& images);
 
-/// What becomes of pixels of this depth, in one line: "pixels are 12 bit in 16: divided by 16";
+/// The conversion of pixels of this depth, in one line: "pixels are 12 bit in 16: divided by 16";
 /// nullopt for 8 bits.
 std::optional<std::string> Describe(const PixelScale& scale, int depth);
 

@@ -13,7 +13,7 @@
 
 namespace rotslam {
 
-// What the forms in rotodom/sequence/forms have in common: looking around on disk.
+// Functions on files and folders that the forms in rotodom/sequence/forms share.
 
 bool IsFolder(const std::filesystem::path& path);
 bool IsFile(const std::filesystem::path& path);
@@ -94,7 +94,7 @@ class ListedFiles {
   /// The file of this name; where it is not there, the path at which it should be.
   std::filesystem::path Find(const std::string& name);
 
-  /// What Find() had to assume, and which files are missing.
+  /// Adds the assumptions of Find(), and the files that are missing.
   void AddNotes(std::vector<std::string>& notes) const;
 
  private:

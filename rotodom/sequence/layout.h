@@ -18,7 +18,7 @@ struct ImageEntry {
   int line = 0;  // of Layout::time_list that tells the time; 0 where none does
 };
 
-/// What a form of input (SequenceForm) found at a path.
+/// The frames that a form of input (SequenceForm) found at a path.
 struct Layout {
   std::string form;                 // name of the form
   bool is_video = false;            // a file whose frames are numbered, without names of their own

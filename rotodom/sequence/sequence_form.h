@@ -19,7 +19,7 @@ struct SequenceForm {
   int rank = 0;
   // Looks at names only and never throws. `path` exists, is absolute, and ends in a name.
   bool (*recognises)(const std::filesystem::path& path) = nullptr;
-  // What lies there; decodes nothing. Throws std::runtime_error, with path and reason in one line.
+  // Lists frames, decodes none. Throws std::runtime_error, with path and reason in one line.
   Layout (*list)(const std::filesystem::path& path, const SequenceOptions& options) = nullptr;
   // Reads the frames of what `list` gave, where these are no image files; else nullptr.
   std::unique_ptr<Sequence> (*open)(const Layout& layout, const SequenceOptions& options) = nullptr;

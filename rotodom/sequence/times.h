@@ -33,7 +33,7 @@ double SecondsFromTicks(std::int64_t ticks, std::int64_t ticks_per_second);
 /// none. "timestamp [ns]", "t_us".
 std::int64_t TicksOfTitle(std::string_view title);
 
-/// What SpokenTimes are read from whose unit nothing tells: whole numbers that differ by a few.
+/// The meaning of whole numbers that step by a few and whose unit nothing tells: no times, or s.
 enum class UnclearTimes { kAreNone, kAreSeconds };
 
 /// The times of a column of a list: numbers or dates. The unit of numbers is `ticks_per_second`
@@ -51,7 +51,7 @@ std::optional<SpokenTimes> TimesOfWords(const std::vector<std::string>& words,
 /// or `sec.nsec`, whose nanoseconds may lack leading zeros; `20260115_063000123`.
 std::optional<SpokenTimes> TimesOfNames(const std::vector<std::string>& stems);
 
-/// What Layout::times_source says of times that are made up: the rate, and what sets it.
+/// The text of Layout::times_source for times that follow from a rate alone.
 std::string MadeUpTimes(double fps);
 
 }  // namespace rotslam

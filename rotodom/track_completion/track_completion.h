@@ -15,7 +15,7 @@
 
 namespace rotslam {
 
-/// Of looking for a map's points in all its images.
+/// Options of the search for a map's points in all its images.
 struct CompletionOptions {
   // Off: tracks stay as the tracker has made them.
   bool enabled = true;

@@ -15,7 +15,7 @@
 
 namespace rotslam {
 
-/// Of tracking features from image to image.
+/// Options of the tracking of features from image to image.
 struct TrackingOptions {
   // Normalised correlation that a patch must reach where it was found; less lets points slide onto
   // other things, more loses them in blur.

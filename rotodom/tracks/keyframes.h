@@ -42,7 +42,7 @@ struct KeyframeOptions {
   }
 };
 
-/// What a frame shares with a keyframe.
+/// The overlap of a frame with a keyframe.
 struct ViewOverlap {
   double shared_ratio = 0.0;  // of the keyframe's tracks
   double parallax_rad = 0.0;  // median angle between the rays of shared tracks

@@ -6,13 +6,13 @@
 
 namespace rotslam {
 
-/// From one world to another that differs in scale, too: x_new = scale * turn * x_old + shift.
+/// A transform to a world that may differ in scale: x_new = scale * turn * x_old + shift.
 struct Similarity {
   double scale = 1.0;
   Rotation turn;
   Eigen::Vector3d shift = Eigen::Vector3d::Zero();
 
-  /// Where a point or a centre comes to lie.
+  /// A point or a centre in the new world.
   Eigen::Vector3d Move(const Eigen::Vector3d& position) const {
     return scale * (turn * position) + shift;
   }

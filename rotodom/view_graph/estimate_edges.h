@@ -15,7 +15,7 @@
 
 namespace rotslam {
 
-/// Which earlier views a new one is tied to, and by what edges.
+/// Which earlier views get an edge to a new one, and which tests edges pass.
 struct ViewGraphOptions {
   // A new frame is matched against this many frames before it; the paper's |F|.
   int window_frames = 4;
@@ -82,7 +82,7 @@ std::vector<EdgeWithMatches> EstimateEdges(const Features& view,
                                            const EdgeOptions& options);
 
 /// Estimates known edges again after the bearings of their views have changed a little
-/// (UpdateRelativeRotation).
+/// (UpdateRelativeRotation). Six parameters: those of EstimateEdges, and `known`.
 /// @param known  edges from `others` to `view`, in the same order.
 /// @return  as EstimateEdges.
 std::vector<EdgeWithMatches> UpdateEdges(const Features& view,

@@ -9,7 +9,7 @@
 
 namespace rotslam {
 
-/// Where two frames see the same track.
+/// The keypoints of one track in two frames.
 struct SharedPoint {
   Eigen::Vector2d i_px;
   Eigen::Vector2d j_px;

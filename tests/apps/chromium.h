@@ -30,6 +30,28 @@ inline std::string ChromiumCommand(const std::string& url,
          dom.string() + "' 2>'" + log.string() + "'";
 }
 
+/// Put before the script of a visitor: pixelsOf(page) gives the pixels of a page's 3-D view, and
+/// differences(a, b) the number of those that differ.
+inline constexpr const char* kPixelScript = R"js(
+<script>
+function differences(a, b) {
+  let count = 0;
+  for (let k = 0; k < a.length; ++k) count += a[k] !== b[k];
+  return count;
+}
+function pixelsOf(page) {
+  page.snapshot();
+  const source = document.querySelector('#view canvas');
+  const copy = document.createElement('canvas');
+  copy.width = source.width;
+  copy.height = source.height;
+  const context = copy.getContext('2d');
+  context.drawImage(source, 0, 0);
+  return context.getImageData(0, 0, copy.width, copy.height).data;
+}
+</script>
+)js";
+
 /// Errors and warnings that the page itself has caused.
 inline std::vector<std::string> ConsoleMessages(const std::string& log) {
   std::vector<std::string> messages;

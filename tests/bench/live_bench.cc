@@ -20,9 +20,9 @@
 
 #include "apps/slam/live/live_slam.h"
 #include "output/trajectory/trajectory.h"
-#include "rotodom/camera/read_camera.h"
 #include "rotodom/sequence/sequence.h"
 #include "rotodom/types/stopwatch.h"
+#include "tests/bench/sequence_camera.h"
 
 namespace rotslam {
 namespace {
@@ -101,13 +101,7 @@ void DrawLatency(const std::filesystem::path& file, const std::vector<double>& l
 int Main(const Flags& flags) {
   SequenceSource source(flags.sequence, {});
   const Sequence& sequence = source.sequence();
-  if (flags.camera.empty() && !sequence.camera_reference()) {
-    throw std::runtime_error(flags.sequence + ": no calibration lies with it, give --camera");
-  }
-  const Camera camera =
-      MatchToImages(flags.camera.empty() ? ReadCamera(*sequence.camera_reference())
-                                         : ReadCamera(ParseCameraReference(flags.camera)),
-                    sequence.image_size());
+  const Camera camera = CameraOfSequence(sequence, flags.camera);
   SlamOptions options;
   options.num_threads = flags.threads;
   LiveOptions live;

@@ -27,9 +27,9 @@
 #include "apps/slam/map_result.h"
 #include "apps/slam/orientations.h"
 #include "apps/slam/slam.h"
-#include "rotodom/camera/read_camera.h"
 #include "rotodom/sequence/sequence.h"
 #include "rotodom/types/stopwatch.h"
+#include "tests/bench/sequence_camera.h"
 
 namespace rotslam {
 namespace {
@@ -204,13 +204,7 @@ void PrintRun(const Flags& flags, int num_threads) {
   if (flags.frames > 0) sequence_options.last = flags.frames - 1;
   SequenceSource source(flags.sequence, sequence_options);
   const Sequence& sequence = source.sequence();
-  if (flags.camera.empty() && !sequence.camera_reference()) {
-    throw std::runtime_error(flags.sequence + ": no calibration lies with it, give --camera");
-  }
-  const Camera camera =
-      MatchToImages(flags.camera.empty() ? ReadCamera(*sequence.camera_reference())
-                                         : ReadCamera(ParseCameraReference(flags.camera)),
-                    sequence.image_size());
+  const Camera camera = CameraOfSequence(sequence, flags.camera);
   SlamOptions options;
   options.num_threads = num_threads;
   MeteredFrames frames(source);

@@ -127,7 +127,7 @@ const RegisterFuzzTarget truth("run_truth",
 const RegisterFuzzTarget map("run_map", [](std::string_view bytes, const TemporaryFolder& folder) {
   const RunData run = ReadWith("map.bin", bytes, folder);
   EmbeddedJson(PageData(run, {}, {}));
-  const RunMap keyframes = KeyframesOnly(*run.keyframe_map);
+  const RunMap keyframes = PartOf(*run.keyframe_map, KeyframesOf(*run.keyframe_map));
   const fs::path out = folder.path() / "exported";
   WriteColmapModel(out, keyframes, ColmapForm::kText);
   WriteColmapModel(out, keyframes, ColmapForm::kBinary);

@@ -18,6 +18,7 @@
 #include "rotodom/averaging/certificate.h"
 #include "rotodom/averaging/global_averaging.h"
 #include "rotodom/averaging/support/edge_positions.h"
+#include "rotodom/averaging/support/orientation_deviations.h"
 #include "rotodom/averaging/support/view_support.h"
 #include "rotodom/types/stopwatch.h"
 
@@ -300,6 +301,7 @@ CenterMap PositionsFor(const RotationList& list,
   return centers;
 }
 
+// Seven parameters: every result of the command, once it has all of them.
 AveragedGraph ToWrite(const AverageFlags& flags,
                       const RotationList& list,
                       const GlobalAveragingOptions& options,

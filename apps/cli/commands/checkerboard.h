@@ -20,13 +20,13 @@ struct Checkerboard {
 /// Corners of one image, row by row, px.
 using BoardCorners = std::vector<cv::Point2f>;
 
-/// Which boards a calibration uses.
+/// Options of a calibration with boards.
 struct BoardCalibrationOptions {
   // Fewer boards cannot tell the lens from the boards' poses.
   int min_boards = 5;
   // So many at most are used, spread evenly over those found: more add time, not accuracy.
   int max_boards = 60;
-  // Boards that fit worse than so many times the median board are blurred or misread; they go.
+  // Boards that fit worse than so many times the median board are blurred or misread: dropped.
   double max_error_ratio = 3.0;
 
   std::optional<std::string> Problem() const;

@@ -59,7 +59,7 @@ std::string DescribePoints(const RunMap& map) {
   return text.data();
 }
 
-// Whether the run directory comes from `rotslam rotations`: it has no map.
+// Whether the run directory is one of `rotslam rotations`, which builds no map.
 bool HasOrientationsOnly(const fs::path& run) {
   return !fs::exists(run / "map.bin") && !fs::exists(run / "map_all_frames.bin") &&
          fs::exists(run / "rotations.csv");

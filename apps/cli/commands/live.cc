@@ -60,6 +60,7 @@ FramePump::Source FramesOf(FrameSource& frames, bool realtime) {
   return realtime ? Paced(std::move(source)) : source;
 }
 
+// Seven parameters: objects of two callers that live in different scopes there.
 LiveSummary RunOnSequence(const LiveFlags& flags,
                           FrameSource& frames,
                           const cv::Size& size,
@@ -78,7 +79,7 @@ RunOutputFlags OutputFlagsOf(const LiveFlags& flags) {
   return {flags.ascii, flags.use_report, flags.track.common};
 }
 
-// What FindOrientations takes beside the frames.
+// The inputs of FindOrientations beside the frames.
 struct TrackingInputs {
   const Camera& camera;
   const SlamOptions& options;
@@ -86,7 +87,7 @@ struct TrackingInputs {
   SlamObserver& observer;
 };
 
-// Where frames were left out, the session has numbers of its own for them: all frames that were
+// A session that has left out frames has numbered them differently from `run`. All frames that were
 // read are then tracked again, as `run` does.
 Orientations FinishSession(LiveSlam& slam,
                            const LiveSummary& summary,
@@ -149,9 +150,8 @@ int LiveFromSequence(const LiveFlags& flags) {
   return FinishRun(tracked, OutputFlagsOf(flags));
 }
 
-// Frames that come once: the images are kept beside the results, as an input for `run`.
-int LiveFromStream(const LiveFlags& flags) {
-  const InputFlags& input = flags.track.input;
+// Throws std::runtime_error where a flag does not suit frames that come once.
+void CheckStreamFlags(const InputFlags& input) {
   if (input.camera.empty() || input.camera == "none") {
     throw std::runtime_error(input.sequence +
                              ": a camera needs its calibration, give --camera FILE; `rotslam "
@@ -160,6 +160,39 @@ int LiveFromStream(const LiveFlags& flags) {
   if (input.first || input.last) {
     throw std::runtime_error(input.sequence + ": --first and --last are for files");
   }
+}
+
+FramePump::Source OpenStream(const LiveFlags& flags, const std::optional<fs::path>& folder) {
+  const InputFlags& input = flags.track.input;
+  const ArrivalTimes times = {input.fps};
+  if (input.sequence == "-") return ImageStream(STDIN_FILENO, times, folder);
+  return flags.follow ? FollowedFolder(input.sequence, times, folder)
+                      : CaptureStream(input.sequence, times, folder);
+}
+
+Camera CameraOfStream(const InputFlags& input) {
+  Camera camera = ReadCamera(ParseCameraReference(input.camera));
+  if (camera.width <= 0 || camera.height <= 0) {
+    throw std::runtime_error(input.camera +
+                             ": does not say the size of its images; add width and height");
+  }
+  return camera;
+}
+
+SlamInputs InputsOfStream(const InputFlags& input, const Camera& camera) {
+  SlamInputs inputs;
+  inputs.vocabulary = OpenVocabulary(input);
+  inputs.find_static_content = input.auto_mask;
+  if (!input.mask.empty()) {
+    inputs.masks.AddToAll(ReadMask(input.mask, {camera.width, camera.height}));
+  }
+  return inputs;
+}
+
+// Frames that come once: the images are kept beside the results, as an input for `run`.
+int LiveFromStream(const LiveFlags& flags) {
+  const InputFlags& input = flags.track.input;
+  CheckStreamFlags(input);
   const RunOptions options = ReadRunOptions(flags.track.common, input);
   std::optional<fs::path> folder;
   if (!input.out.empty()) folder = PrepareRunDirectory(input.out) / "frames";
@@ -171,23 +204,10 @@ int LiveFromStream(const LiveFlags& flags) {
   {
     Interruption interruption;
     Progress progress(flags.track.common);
-    const ArrivalTimes times = {input.fps};
-    const FramePump::Source source = input.sequence == "-"
-                                         ? ImageStream(STDIN_FILENO, times, folder)
-                                     : flags.follow ? FollowedFolder(input.sequence, times, folder)
-                                                    : CaptureStream(input.sequence, times, folder);
-    const Camera camera = ReadCamera(ParseCameraReference(input.camera));
-    if (camera.width <= 0 || camera.height <= 0) {
-      throw std::runtime_error(input.camera +
-                               ": does not say the size of its images; add width and height");
-    }
-    SlamInputs inputs;
-    inputs.vocabulary = OpenVocabulary(input);
-    inputs.find_static_content = input.auto_mask;
-    if (!input.mask.empty()) {
-      inputs.masks.AddToAll(ReadMask(input.mask, {camera.width, camera.height}));
-    }
-    slam = std::make_unique<LiveSlam>(camera, options, LiveOptions(), inputs);
+    const FramePump::Source source = OpenStream(flags, folder);
+    const Camera camera = CameraOfStream(input);
+    slam =
+        std::make_unique<LiveSlam>(camera, options, LiveOptions(), InputsOfStream(input, camera));
     const LiveOutputs outputs = OpenOutputs(flags, camera, progress);
     FramePump pump(source, flags.BacklogOr(Backlog::kDrop));
     summary = RunLiveSession(

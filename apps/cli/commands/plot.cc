@@ -7,7 +7,7 @@
 #include "apps/cli/input/config.h"
 #include "apps/cli/run_directory/run_directory.h"
 #include "apps/cli/run_directory/run_report.h"
-#include "apps/report/figures.h"
+#include "apps/report/figures/figures.h"
 #include "apps/report/run_data.h"
 #include "output/files/atomic_file.h"
 

@@ -104,12 +104,48 @@ void Warn(const TrackedInput& tracked,
            : std::string()));
 }
 
-// What only tracking and the estimate of a lens ask of features.
-void DropTrackersPart(Orientations& orientations) {
+// Drops the fields of features that only tracking and lens estimation read.
+void DropTrackingFields(Orientations& orientations) {
   for (auto& [frame, features] : orientations.features) {
     features.covariances_px = {};
     features.tracks = {};
   }
+}
+
+// Writes the files of a finished run into the folder of unfinished outputs, and publishes them.
+// @param positions  loses the tracks of its cloud, as WriteMaps says.
+RunSummary WriteRun(TrackedInput& tracked,
+                    MapResult& positions,
+                    PlyForm ply,
+                    double orientations_s) {
+  const double positions_s = SecondsSince(tracked.start) - orientations_s - tracked.lens_s;
+  const std::filesystem::path& folder = tracked.outputs.folder();
+  const Orientations& orientations = tracked.orientations;
+  WritePositions(folder, orientations, positions, ply);
+  WriteKnownRotationInput(folder,
+                          orientations,
+                          positions,
+                          positions.through_lens ? positions.camera : tracked.input.camera);
+  FeatureOptions features = tracked.options.rotodom.features;
+  features.num_levels += tracked.working.NumLevelsBelow(features.scale_factor);
+  WriteCameraYaml(folder / "camera.yaml", positions.camera, positions.lens_sigmas);
+  WriteMaps(folder, tracked.input.sequence(), orientations, positions, features);
+  RunSummary summary = SummariseRun(tracked, positions);
+  summary.seconds.push_back({"orientations", orientations_s});
+  summary.seconds.push_back({"positions", positions_s});
+  summary.seconds.push_back({"total", SecondsSince(tracked.start)});
+  WriteSummary(folder / "summary.json", summary);
+  tracked.outputs.Publish();
+  return summary;
+}
+
+// Writes the report from the files of the run. Data that are in these leave the memory first.
+void WriteReport(TrackedInput& tracked, MapResult& positions, const CommonFlags& flags) {
+  tracked.orientations.features.clear();
+  tracked.orientations.edge_matches = {};
+  tracked.orientations.places.clear();
+  positions.map.tracks = positions.keyframe_tracks = {};
+  WriteReportOfRun(tracked.directory, flags, tracked.progress);
 }
 
 }  // namespace
@@ -117,7 +153,6 @@ void DropTrackersPart(Orientations& orientations) {
 int FinishRun(TrackedInput& tracked, const RunOutputFlags& flags) {
   const Input& input = tracked.input;
   Orientations& orientations = tracked.orientations;
-  const std::filesystem::path& folder = tracked.outputs.folder();
   Progress& progress = tracked.progress;
   if (input.guess) {
     FreeLens(PlainLens(tracked.working.Reduced(input.camera)), tracked.options.ba.lens);
@@ -134,44 +169,25 @@ int FinishRun(TrackedInput& tracked, const RunOutputFlags& flags) {
     return Interruption::kExitCode;
   }
 
-  DropTrackersPart(tracked.orientations);
+  DropTrackingFields(orientations);
   MapResult positions = [&] {
     const EndAtInterruption end_at_interruption(tracked.interruption, end_early);
     return BuildMap(orientations, tracked.options, &tracked.frames, tracked.observer);
   }();
   if (positions.through_lens) {
     TakeThroughLens(positions, orientations);
-    WriteOrientations(folder, orientations, tracked.options.rotodom.averaging);
+    WriteOrientations(tracked.outputs.folder(), orientations, tracked.options.rotodom.averaging);
   }
   tracked.ToOriginalSize(positions);
   tracked.ToOriginalSize();
-  const double positions_s = SecondsSince(tracked.start) - orientations_s - tracked.lens_s;
-  WritePositions(folder, orientations, positions, flags.ascii ? PlyForm::kAscii : PlyForm::kBinary);
-  WriteKnownRotationInput(
-      folder, orientations, positions, positions.through_lens ? positions.camera : input.camera);
-  FeatureOptions features = tracked.options.rotodom.features;
-  features.num_levels += tracked.working.NumLevelsBelow(features.scale_factor);
-  WriteCameraYaml(folder / "camera.yaml", positions.camera, positions.lens_sigmas);
-  WriteMaps(folder, input.sequence(), orientations, positions, features);
-  RunSummary summary = SummariseRun(tracked, positions);
-  summary.seconds.push_back({"orientations", orientations_s});
-  summary.seconds.push_back({"positions", positions_s});
-  summary.seconds.push_back({"total", SecondsSince(tracked.start)});
-  WriteSummary(folder / "summary.json", summary);
-  tracked.outputs.Publish();
+  const RunSummary summary = WriteRun(
+      tracked, positions, flags.ascii ? PlyForm::kAscii : PlyForm::kBinary, orientations_s);
 
   Warn(tracked, positions, *summary.segments, progress);
   for (const CheckReason& reason : CheckRun(tracked.directory).reasons) {
     if (reason.warns) progress.Warn(reason.frames + ": " + reason.text);
   }
-  if (flags.use_report) {
-    // The report reads what has been written; that is not to be in memory twice.
-    tracked.orientations.features.clear();
-    tracked.orientations.edge_matches = {};
-    tracked.orientations.places.clear();
-    positions.map.tracks = positions.keyframe_tracks = {};
-    WriteReportOfRun(tracked.directory, flags.common, progress);
-  }
+  if (flags.use_report) WriteReport(tracked, positions, flags.common);
   tracked.checkpoint.Remove();
   progress.Say("wrote " + tracked.directory.string() +
                ": trajectory_tum.txt, trajectory_kitti.txt, keyframes_tum.txt, "

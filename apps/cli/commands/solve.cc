@@ -173,13 +173,9 @@ RotationPriors PriorsOf(const SolveFlags& flags,
   return priors;
 }
 
-int Solve(const SolveFlags& flags) {
-  const Clock::time_point start = Clock::now();
-  Progress progress(flags.common);
-  RunOptions options = ReadRunOptions(flags.common);
-  flags.krot.Override(options.krot);
-  options.krot.num_threads = options.ba.num_threads = options.num_threads;
-
+// Reads the problem, with other orientations where the flags name some. Throws std::runtime_error
+// where these are in another convention.
+KnownRotationInput ReadInput(const SolveFlags& flags, Progress& progress) {
   progress.StartStage("reading", -1);
   KnownRotationInput input = ReadKnownRotation(flags.input);
   progress.EndStage(input.format + ", " + std::to_string(input.cam_from_world.size()) + " views, " +
@@ -192,9 +188,34 @@ int Solve(const SolveFlags& flags) {
   }
   RefuseOtherConventions(flags.relative_rotations.empty() ? flags.input : flags.relative_rotations,
                          input);
+  return input;
+}
+
+RunOptions OptionsOf(const SolveFlags& flags) {
+  RunOptions options = ReadRunOptions(flags.common);
+  flags.krot.Override(options.krot);
+  options.krot.num_threads = options.ba.num_threads = options.num_threads;
   if (!flags.adjust && flags.krot.start.empty() && options.krot.use_bracket) {
     options.krot.start = KrotStart::kBisection;
   }
+  return options;
+}
+
+// Throws std::runtime_error where there is no map.
+void RequireMap(const SolveFlags& flags, const Solution& solution) {
+  const KrotSolution& krot = solution.krot;
+  if (!krot.Usable()) throw std::runtime_error(flags.input + ": " + krot.message);
+  if (!solution.maps.empty()) return;
+  throw std::runtime_error(
+      flags.input + ": bundle adjustment found no usable map" +
+      (krot.status == KrotStatus::kContradiction ? "; " + krot.message : std::string()));
+}
+
+int Solve(const SolveFlags& flags) {
+  const Clock::time_point start = Clock::now();
+  Progress progress(flags.common);
+  RunOptions options = OptionsOf(flags);
+  KnownRotationInput input = ReadInput(flags, progress);
   // Several cameras are solved as one pinhole, which has no lens to refine.
   if (input.colmap != nullptr && input.colmap->HasSeveralCameras()) {
     options.ba = WithFixedLens(options.ba);
@@ -206,13 +227,7 @@ int Solve(const SolveFlags& flags) {
   const std::filesystem::path directory = PrepareRunDirectory(flags.out);
 
   const Solution solution = SolveAtWorkingSize(input, priors, options, flags.adjust, progress);
-  const KrotSolution& krot = solution.krot;
-  if (!krot.Usable()) throw std::runtime_error(flags.input + ": " + krot.message);
-  if (solution.maps.empty()) {
-    throw std::runtime_error(
-        flags.input + ": bundle adjustment found no usable map" +
-        (krot.status == KrotStatus::kContradiction ? "; " + krot.message : std::string()));
-  }
+  RequireMap(flags, solution);
   if (flags.adjust) {
     const BundleSummary& largest = solution.refined.bundles[solution.component.front()].summary;
     progress.EndStage(std::to_string(largest.num_frames) + " views, " +
@@ -243,7 +258,7 @@ int Solve(const SolveFlags& flags) {
                   "poses.csv and segments.csv tell apart");
   }
   WarnOfUnplaced(input, positions, progress);
-  if (krot.status == KrotStatus::kContradiction) progress.Warn(krot.message);
+  if (solution.krot.status == KrotStatus::kContradiction) progress.Warn(solution.krot.message);
   progress.Say("wrote " + directory.string() +
                ": keyframes_tum.txt, cloud.ply, views.csv, residuals.csv, removed.csv, map.bin, " +
                (input.colmap != nullptr ? "sparse, " : "") +

@@ -73,7 +73,7 @@ struct RunOutputFlags {
   const CommonFlags& common;
 };
 
-/// What `run` and `live` do once the orientations are found: builds the map and writes the run
+/// The second half of `run` and `live`, after the orientations: builds the map and writes the run
 /// directory. Throws std::runtime_error where there is no map; orientations are written then.
 /// @return  the program's exit code.
 int FinishRun(TrackedInput& tracked, const RunOutputFlags& flags);

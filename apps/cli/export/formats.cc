@@ -71,6 +71,7 @@ void ExportCsv(const ExportJob& job) {
 
 }  // namespace
 
+// A table: one entry for each format.
 const std::map<std::string, Format>& Formats() {
   static const std::map<std::string, Format> formats = {
       {"colmap",

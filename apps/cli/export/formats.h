@@ -12,7 +12,7 @@
 
 namespace rotslam {
 
-/// What a format's writer gets.
+/// The input of a format's writer.
 struct ExportJob {
   RunMap map;  // of the frames to be written
   std::filesystem::path run;
@@ -27,7 +27,7 @@ struct ExportJob {
   std::function<void(const std::string&)> say;
 };
 
-/// Which frames of the run are written.
+/// The frames that an export writes.
 enum class FrameChoice {
   kAll,
   kKeyframes,

@@ -29,7 +29,7 @@ void CheckImages(const std::filesystem::path& run,
                  const ImageObserver& observer,
                  RunMap& map);
 
-/// What is done to an image before it is written; null: nothing.
+/// Changes an image before it is written; null: it is written as it is.
 using ImageChange = std::function<cv::Mat(const cv::Mat& image)>;
 
 /// Writes the images of all frames that a run has read into `folder`, under the names that the map

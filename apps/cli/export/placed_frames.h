@@ -9,10 +9,10 @@
 
 namespace rotslam {
 
-/// Which frames of a map have a place, and which of those places are measured in one scale.
+/// The frames of a map that have a position, by the scale in which these are measured.
 struct PlacedFrames {
-  // Parts of the map, by their first frame; no measurement ties the scale of one to another. Empty
-  // where no frame has a place.
+  // Components of the map, by their first frame; no measurement ties the scale of one to that of
+  // another. Empty where no frame has a position.
   std::vector<std::set<FrameId>> components;
   std::set<FrameId> unplaced;
 };

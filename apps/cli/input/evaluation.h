@@ -35,8 +35,8 @@ Comparison CompareTrajectoryFiles(const std::filesystem::path& ground_truth,
 /// Share of the images whose estimated pose has ground truth, to four decimals; nullopt for none.
 std::optional<double> Coverage(const TrajectoryMetrics& metrics, int num_images);
 
-/// What `rotslam eval --json` prints; null where a metric is not defined, "notes" only where there
-/// are any.
+/// The metrics as `rotslam eval --json` prints them; null where a metric is not defined, "notes"
+/// only where there are any.
 nlohmann::ordered_json MetricsJson(const Comparison& comparison, int num_images);
 
 }  // namespace rotslam

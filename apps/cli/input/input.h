@@ -19,7 +19,7 @@
 
 namespace rotslam {
 
-/// What `run` and `rotations` take.
+/// The input flags of `run` and `rotations`.
 struct InputFlags {
   std::string sequence;
   std::string camera;        // `none`: the lens is estimated, whatever lies with the images

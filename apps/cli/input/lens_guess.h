@@ -11,7 +11,7 @@
 
 namespace rotslam {
 
-/// Where the first guess of a focal length comes from.
+/// The source of the first guess of a focal length.
 enum class FocalSource {
   kImageSize,      // GuessFocalLength
   kExif,           // EXIF data of the first image

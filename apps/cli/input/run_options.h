@@ -10,7 +10,7 @@
 
 namespace rotslam {
 
-/// All that `rotslam run` can be told: how the sequence is read, and the system's options.
+/// All options of `rotslam run`: how the sequence is read, and the system's options.
 struct RunOptions : SlamOptions {
   SequenceOptions sequence;
 

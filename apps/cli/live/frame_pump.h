@@ -12,7 +12,7 @@
 
 namespace rotslam {
 
-/// What becomes of frames that come faster than they are taken.
+/// How frames are handled that come faster than they are taken.
 enum class Backlog {
   kDrop,  // the newest one replaces those that wait, as with a camera
   kWait,  // the source waits

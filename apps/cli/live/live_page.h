@@ -11,7 +11,7 @@
 
 namespace rotslam {
 
-/// Of the page that shows a live session.
+/// The flags of the page that shows a live session.
 struct LivePageFlags {
   bool is_on = false;
   int port = 8080;
@@ -20,8 +20,8 @@ struct LivePageFlags {
 
 void AddLivePageFlags(CLI::App& command, LivePageFlags& flags);
 
-/// Serves the page and says where it is; what it returns shows a frame on it, and keeps it up.
-/// Empty where no page is asked for. Throws std::runtime_error where the port cannot be had.
+/// Serves the page and prints its address. The returned function shows a frame on it and keeps the
+/// page up; it is empty where no page is asked for. Throws std::runtime_error on a busy port.
 std::function<void(const LiveOutputs::Shown&)> OpenLivePage(const LivePageFlags& flags,
                                                             const Camera& camera,
                                                             Progress& progress);

@@ -13,7 +13,7 @@
 
 namespace rotslam {
 
-/// What a live session tells others while it runs.
+/// The outputs of a live session while it runs.
 struct LiveOutputs {
   std::unique_ptr<PoseOutput> poses;  // null: nobody
   // Called after every frame with its image; empty: nobody.
@@ -39,6 +39,7 @@ struct LiveSummary {
 
 /// Gives frames to `slam` until they end or `should_stop` says so. A frame that cannot be read, or
 /// is of another size, is told once and counts as an unreadable one.
+/// Six parameters: the objects that it connects, which have different owners.
 LiveSummary RunLiveSession(FramePump& frames,
                            LiveSlam& slam,
                            const cv::Size& size,

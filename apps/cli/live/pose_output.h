@@ -11,7 +11,7 @@ namespace rotslam {
 /// state revision`, camera->world; `nan nan nan` where there is no position.
 std::string PoseLine(const LiveEstimate& estimate);
 
-/// Where the lines of a live session go, each at once.
+/// A receiver of the lines of a live session, which are sent one by one.
 class PoseOutput {
  public:
   virtual ~PoseOutput() = default;

@@ -26,8 +26,8 @@ void AddCheckpointFlags(CLI::App& command, CheckpointFlags& flags);
 /// Without --resume.
 void AddCheckpointEveryFlag(CLI::App& command, CheckpointFlags& flags);
 
-/// What orientations depend on, by name: a run goes on from a checkpoint where all of it is the
-/// same.
+/// Everything that orientations depend on, by name. A run goes on from a checkpoint only if all of
+/// it is the same.
 using RunIdentity = std::vector<std::pair<std::string, std::string>>;
 RunIdentity IdentityOf(const std::string& command,
                        const Input& input,
@@ -35,12 +35,12 @@ RunIdentity IdentityOf(const std::string& command,
                        const RunOptions& options,
                        std::uint64_t seed);
 
-/// What a run needs to go on after it was killed: two files in UnfinishedFolder(), which is there
-/// from the first checkpoint until Remove().
+/// Two files from which a killed run goes on. They are in UnfinishedFolder() from the first
+/// checkpoint until Remove().
 ///   frames.bin  a journal with a record per frame, which grows as they come
 ///   state.bin   the run's identity, which part of the journal counts, and the odometry's state
 ///               after it; replaced as a whole, so that one that can be used is always there
-/// When the disk refuses, the run goes on without checkpoints; the last one stays.
+/// When writing fails, the run goes on without checkpoints; the last one stays.
 class Checkpoint : public FrameLog {
  public:
   /// With flags.resume, opens what an interrupted run has left, or says that there is nothing;

@@ -9,11 +9,11 @@
 namespace rotslam {
 
 /// Makes the folder for a run's results and proves that it can be written, before hours of work.
-/// What a killed run was about to publish there is published. Throws std::runtime_error with path
-/// and reason.
+/// Makes the folder of a run and publishes the files that a killed run was publishing there. Throws
+/// std::runtime_error with path and reason.
 std::filesystem::path PrepareRunDirectory(const std::string& out);
 
-/// What the terminal says of a run that Ctrl-C has ended: what WriteOrientations has left.
+/// The message for a run that Ctrl-C has ended: it names the files that WriteOrientations has left.
 std::string DescribeInterrupted(const std::filesystem::path& directory,
                                 const Orientations& orientations,
                                 const Checkpoint& checkpoint);

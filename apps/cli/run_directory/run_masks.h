@@ -11,8 +11,8 @@
 
 namespace rotslam {
 
-/// What a run ignored: mask.png in its folder, and the masks per frame that it was given, both as
-/// summary.json says. Throws std::runtime_error where one of these is not there any more.
+/// Reads the masks of a run: mask.png in its folder, and the masks per frame that it was given,
+/// both as summary.json names them. Throws std::runtime_error where one of these is missing.
 FrameMasks ReadRunMasks(const std::filesystem::path& run);
 
 /// Writes the masks of the exported images as `folder`/NAME.png, as COLMAP's ImageReader.mask_path

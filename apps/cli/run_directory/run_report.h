@@ -15,7 +15,7 @@ void WriteReportOfRun(const std::filesystem::path& directory,
                       const CommonFlags& flags,
                       Progress& progress);
 
-/// What `report` and `plot` compare a run with.
+/// Adds the flags that name the ground truth of `report` and `plot`.
 void AddTruthFlags(CLI::App& command, TruthSource& truth);
 
 /// `run` and `rotations` write one; `--no-report` leaves it out.

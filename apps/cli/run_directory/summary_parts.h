@@ -21,7 +21,7 @@ void AddPositions(const MapResult& positions, const Camera& camera, RunSummary& 
 
 /// The parts that `run` and `solve` share.
 void AddKnownRotation(const KrotSolution& solution, const Camera& camera, RunSummary& summary);
-/// To the known rotation's part: what bundle adjustment has made of it. Nothing without a map.
+/// Adds to the known rotation's part the bracket after bundle adjustment. Nothing without a map.
 void AddFinalBracket(const MapBracket& bracket, const Camera& camera, RunSummary& summary);
 /// Nothing without a map.
 void AddBundles(const MapResult& positions, RunSummary& summary);

@@ -7,8 +7,8 @@ namespace rotslam {
 /// Folder in a run's folder that is there only as long as the run is unfinished.
 std::filesystem::path UnfinishedFolder(const std::filesystem::path& run);
 
-/// Where a run puts its files together until all are there: the folder of the run keeps what it had
-/// before, complete, until then. `summary.json` is to be written last and says that all are there.
+/// The folder in which a run collects its files until it has written all of them. Until then the
+/// run's own folder keeps its older files. Write `summary.json` last: it says that all are there.
 class UnfinishedOutputs {
  public:
   /// @param run  the run's folder.
@@ -26,8 +26,8 @@ class UnfinishedOutputs {
   std::filesystem::path folder_;
 };
 
-/// What a run killed in the middle of it had still to publish is published, what a run killed
-/// before it has left is removed. A checkpoint stays.
+/// Tidies up after a killed run: files that it was publishing are published, files that it had only
+/// collected are removed. A checkpoint stays.
 void ClearUnfinishedOutputs(const std::filesystem::path& run);
 
 }  // namespace rotslam

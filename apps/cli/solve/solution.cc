@@ -57,6 +57,7 @@ std::vector<MapComponent> ComponentsOf(const KrotSolution& krot) {
 }
 
 // Bundle adjustment of every component, the one with the most views first, which refines the lens.
+// Six parameters: those of known rotation and its solution.
 RefinedComponents Adjust(const KnownRotationInput& input,
                          const RotationPriors& priors,
                          const std::vector<Track>& tracks,

@@ -48,6 +48,7 @@ void WriteViews(const std::filesystem::path& path,
 
 /// Writes the COLMAP model that came in, with what came out, and says how the two compare.
 /// @param from  the folder of the model.
+/// Six parameters: input and result of the command, and where they are written.
 void WriteSolvedColmap(const std::filesystem::path& directory,
                        const std::string& from,
                        const KnownRotationInput& input,

@@ -36,7 +36,7 @@ class Interruption {
 
   /// Whether to stop after the frame at hand.
   bool IsRequested() const { return is_requested_; }
-  /// What was asked for is done; the next signal counts as the first one.
+  /// Call it when the request has been fulfilled: the next signal counts as the first one.
   void Answer() { is_requested_ = false; }
 
  private:

@@ -12,7 +12,7 @@
 
 namespace rotslam {
 
-/// What the odometry found for one frame; the image is not stored.
+/// The result of the odometry for one frame, without the image.
 struct RecordedFrame {
   Frame frame;
   FrameThumbnail thumbnail;
@@ -25,7 +25,7 @@ struct RecordedFrame {
   }
 };
 
-/// What the images have told so far, and for which tracking has started again.
+/// Properties of the camera that were found in the images, each of which made tracking start again.
 struct FoundInImages {
   std::optional<ReadoutEstimate> readout;
   StaticContent static_content;
@@ -59,7 +59,7 @@ class FrameLog {
   /// `restore` does.
   virtual void Restore(const std::function<void(const TrackingState&)>& restore) const = 0;
 
-  /// What the interrupted run had found in the images.
+  /// The properties that the interrupted run had found in the images.
   virtual const FoundInImages& found() const = 0;
   /// Removes all frames; tracking starts again from the first frame with what was found.
   virtual void StartOver(const FoundInImages& found) = 0;

@@ -32,11 +32,11 @@ struct GivenRotations {
   }
 };
 
-/// What the images say of the frames' orientations, for FuseOrientations().
+/// The orientations that the images give, in the form that FuseOrientations() takes.
 /// @param timestamps_s  by frame id.
-/// @param images        an orientation for every frame; the variance of a step is what the
-///                      covariances grow by, where these are known, else that of the edges, both
-///                      times ClosureVariance(). No edge across a step: the images do not connect.
+/// @param images        an orientation for every frame. The variance of a step is the growth of
+///                      the covariances where these are known, else that of the edges, both times
+///                      ClosureVariance(). A step without an edge is not connected by the images.
 ImageOrientations OrientationsOfImages(const std::vector<double>& timestamps_s,
                                        const OdometryResult& images);
 

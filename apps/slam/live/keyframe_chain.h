@@ -2,6 +2,7 @@
 
 #include <map>
 #include <span>
+#include <utility>
 
 #include <Eigen/Core>
 
@@ -15,7 +16,7 @@ namespace rotslam {
 struct ChainedKeyframe {
   Rotation cam_from_world;
   Eigen::Vector3d center_in_world = Eigen::Vector3d::Zero();
-  int part = 0;  // between parts the scale is a guess
+  int component = 0;  // between components the scale is a guess
 };
 using KeyframeChain = std::map<FrameId, ChainedKeyframe>;
 
@@ -25,29 +26,35 @@ struct PlaceLink {
   FrameId newer;
   // Centre of the newer keyframe in the camera frame of the older one, in the scale there.
   Eigen::Vector3d newer_in_older = Eigen::Vector3d::Zero();
-  // What distances around the newer keyframe are to be multiplied by to have that scale.
+  // Distances around the newer keyframe, multiplied by this, have that scale.
   double scale = 1.0;
 };
 
-/// The chain's orientations as averaged ones have them: what both differ by, slowly as it changes
-/// along the chain, is taken over, while neighbours keep their relative rotations, which adjustment
-/// has found.
-/// @param averaged  orientations in a world of their own; of every keyframe.
-/// @return  cam_from_world of every keyframe.
-RotationMap BendTo(const RotationMap& averaged, const KeyframeChain& chain);
+/// A similarity for every keyframe of a chain: it moves the keyframe and what it sees.
+using KeyframeMoves = std::map<FrameId, Similarity>;
 
-/// Positions and scales along a chain whose orientations are known anew, so that links close:
+/// The move of a frame: that of the keyframe at or before it, else of the first one.
+/// @param moves  at least one.
+const Similarity& MoveAt(const KeyframeMoves& moves, FrameId frame);
+
+/// Rotates the keyframes of a chain until they follow averaged orientations. Neighbours keep their
+/// relative rotations, which adjustment has found: only the difference from the averaged ones that
+/// four neighbours on either side have in common is taken over.
+/// @param averaged  of every keyframe, in a world of their own.
+/// @return  cam_from_world of every keyframe.
+RotationMap FollowAveraged(const RotationMap& averaged, const KeyframeChain& chain);
+
+/// Finds positions and scales along a chain with new orientations, so that links close:
 /// first the scales, whose logarithms are spread over the chain, then the centres, whose steps keep
 /// their directions and lengths as the new orientations and scales have them. Both are linear.
 /// @param cam_from_world  of every keyframe.
 /// @param kept            pairs (older, newer) that were linked before; they stay as they are.
-/// @return  for every keyframe what moves it and what lies around it.
 /// Cost:    linear in the keyframes: some milliseconds for a thousand.
 /// Source:  Strasdat, Montiel & Davison, Scale Drift-Aware Large Scale Monocular SLAM, RSS 2010;
 ///          ours has the rotations from averaging, so that nothing is left to iterate.
-std::map<FrameId, Similarity> CloseLinks(const KeyframeChain& chain,
-                                         const RotationMap& cam_from_world,
-                                         std::span<const std::pair<FrameId, FrameId>> kept,
-                                         std::span<const PlaceLink> links);
+KeyframeMoves CloseLinks(const KeyframeChain& chain,
+                         const RotationMap& cam_from_world,
+                         std::span<const std::pair<FrameId, FrameId>> kept,
+                         std::span<const PlaceLink> links);
 
 }  // namespace rotslam

@@ -17,10 +17,10 @@ struct LiveKeyframe {
   double timestamp_s = 0.0;
   Rotation cam_from_world;
   Eigen::Vector3d center_in_world = Eigen::Vector3d::Zero();
-  // Part of the map that it belongs to. The scale of a part against the one before is a guess:
-  // nothing that both see has a depth.
-  int part = 0;
-  // What loops have multiplied distances around it by since it was added.
+  // Component of the map that it belongs to. The scale of a component against the one before is a
+  // guess: nothing that both see has a depth.
+  int component = 0;
+  // The factor by which loops have changed distances around it since it was added.
   double scale = 1.0;
 };
 
@@ -30,11 +30,11 @@ struct LivePoint {
   std::array<std::uint8_t, 3> rgb = {128, 128, 128};
 };
 
-/// The map of a live session as it stood once. It never changes; later ones have other objects.
+/// The map of a live session at one moment. It never changes; each later map is another object.
 struct LiveMap {
   int revision = 0;  // counts the maps, from 1
-  // Times that loops have moved all of it, and how these have moved what lies around the newest
-  // keyframe.
+  // Number of times that loops have moved the map, and by how much they have moved the surroundings
+  // of the newest keyframe.
   int num_corrections = 0;
   Similarity moved;
   std::vector<LiveKeyframe> keyframes;  // by frame

@@ -29,7 +29,7 @@ enum class LiveState {
 /// Name of a state as files write it.
 const char* ToString(LiveState state);
 
-/// What one frame of a live session brings.
+/// The result for one frame of a live session.
 struct LiveEstimate {
   FrameId frame;
   double timestamp_s = 0.0;
@@ -53,12 +53,12 @@ struct LivePathPose {
   std::optional<Eigen::Vector3d> center_in_world;  // nullopt where no map reaches
 };
 
-/// Of a live session, beside those of the system.
+/// Options of a live session, beside SlamOptions.
 struct LiveOptions {
-  // The map of a keyframe is used from frames on that are so much later, s. Less brings new points
+  // The map with a keyframe is used so much later than the keyframe, s. Less brings new points
   // sooner; more leaves a slow machine more time before a frame has to wait for the map.
   double handover_s = 0.2;
-  // Loops move the map. Off: they turn orientations alone until the session ends.
+  // Loops move the map. Off: they correct only orientations until the session ends.
   bool correct_map = true;
 };
 
@@ -94,8 +94,8 @@ class LiveSlam {
 
   /// Finishes the session: the result is that of RunSlam for the same frames. No frame may be added
   /// afterwards.
-  /// @param frames  the same frames once more, for what needs their images again; null: nothing
-  ///                does, and points are not looked for in more images. Where the images have
+  /// @param frames  the same frames once more, for stages that need their images again; null:
+  ///                these are left out, and tracks are not completed. Where the images have
   ///                shown a rolling shutter or static content that was not known, all of them are
   ///                tracked again with that.
   /// Throws as RunSlam does.
@@ -105,7 +105,7 @@ class LiveSlam {
   /// @param frames  reduced to that size.
   Orientations FinishOrientations(FrameSource* frames, SlamObserver& observer);
 
-  /// Where the newest frame sees points of the map, in pixels of the images that were given.
+  /// Keypoints of the newest frame that are points of the map, px of the images that were given.
   std::vector<Eigen::Vector2d> SeenPointsPx() const;
 
   int num_frames() const { return num_frames_; }
@@ -136,9 +136,9 @@ class LiveSlam {
   void SetState(LiveEstimate& estimate) const;
   void ChooseKeyframe(const Candidate& frame, double now_s);
   void AddKeyframe(const Candidate& frame, double now_s);
-  // Goes on from a map that loops have moved.
+  // Moves the newest poses along with a map that loops have moved.
   void FollowCorrection(const LiveMap& map);
-  // Takes what the newest frame's loops have matched, edges from `first_edge` on.
+  // Collects the matches of the newest frame's loops: edges from `first_edge` on.
   void NoteLoops(std::size_t first_edge);
   FrameId KeyframeNearest(FrameId frame) const;
   void PostLoops(double now_s);

@@ -23,8 +23,8 @@ class MapThread {
   MapThread(const MapThread&) = delete;
   MapThread& operator=(const MapThread&) = delete;
 
-  /// Gives a keyframe, or what loops bring. Its map is due at `due_s`, not before that of what was
-  /// given before.
+  /// Hands a keyframe or loops to the mapper. The map after it is due at `due_s`, but not before
+  /// the map of an earlier call.
   void Post(std::variant<KeyframeInput, LoopInput> input, double due_s);
 
   /// The newest map that is due by `now_s`, waiting for it where it is not ready; null where there

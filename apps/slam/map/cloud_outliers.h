@@ -7,7 +7,7 @@
 
 namespace rotslam {
 
-/// Which points of a cloud stand alone.
+/// Which points of a cloud are isolated, and whether they are removed.
 struct CloudOutlierOptions {
   // Whether points that stand alone leave the cloud.
   bool remove = true;

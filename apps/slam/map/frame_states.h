@@ -14,7 +14,7 @@
 
 namespace rotslam {
 
-/// What frame registration has found.
+/// The result of frame registration.
 struct Registration {
   std::map<FrameId, ResectedPose> measured;  // against points; keyframes with their covariance
   std::map<FrameId, FrameId> shared_center;  // in a pure rotation: the keyframe with its position

@@ -28,7 +28,7 @@ struct OrientationInMap {
   Eigen::Matrix3d covariance = Eigen::Matrix3d::Zero();
 };
 
-/// Of the turn from one frame to another one, against the edge between them.
+/// Compares the rotation from one frame to another with the edge between them.
 /// @param edge     from `before` to `after`.
 OdometryDeparture DepartureOf(const RelativeRotation& edge,
                               const OrientationInMap& before,

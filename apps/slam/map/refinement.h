@@ -26,12 +26,12 @@ struct RefinedComponents {
   Camera camera;                         // as the component with the most observations refined it
 };
 
-/// Where the bundle adjustment of components starts.
+/// Start values for the bundle adjustment of components.
 struct RefinementStart {
   const RotationMap& cam_from_world;
   const CenterMap& center_in_world;
   const std::vector<Track>& tracks;  // outliers among their observations are classified anew
-  // Where both ends of one are keyframes of a component they share a centre.
+  // The two keyframes at the ends of a segment share a centre if they are in one component.
   std::span<const PureRotationSegment> segments = {};
   // Deviations of the rotations where they are measurements of a sensor.
   std::map<FrameId, double> rotation_sigma_rad = {};

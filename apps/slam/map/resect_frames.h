@@ -30,7 +30,7 @@ std::map<FrameId, ResectedPose> ResectFrames(const std::map<FrameId, ResectionSt
                                              const ResectionOptions& options,
                                              int num_threads);
 
-/// What the points of a map tell about frames whose poses stay: AssessPose for each.
+/// Checks frames against the points of a map without moving them: AssessPose for each.
 std::map<FrameId, ResectedPose> AssessFrames(const std::map<FrameId, ResectionStart>& poses,
                                              const SeenMap& map,
                                              const Camera& camera,

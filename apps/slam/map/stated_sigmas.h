@@ -9,7 +9,7 @@ namespace rotslam {
 
 /// How well a lens is known after adjustment, as it is stated to people and in camera files: larger
 /// than adjustment's own deviations, which take the errors of neighbouring observations for
-/// independent. What was held, or what no adjustment has asked the images for, is known as well as
+/// independent. Parameters that were held, or that no adjustment has estimated, are as certain as
 /// before.
 /// @param refined  adjustment's own, zero for what was held; nullopt: nothing moved.
 /// @param priors   what adjustment took for known.

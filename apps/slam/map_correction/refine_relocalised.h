@@ -8,7 +8,7 @@
 
 namespace rotslam {
 
-/// What the bundle adjustments of relocalised maps have in common.
+/// Inputs that all bundle adjustments of relocalised maps share.
 struct RelocalisedRefinement {
   Camera calibrated;  // as it was given
   BundleOptions options = {};

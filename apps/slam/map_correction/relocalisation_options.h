@@ -5,7 +5,7 @@
 
 namespace rotslam {
 
-/// Of finding frames again that a map holds in a wrong place, or that only another map holds.
+/// Options of Relocalise, which finds frames that a map has in a wrong place or not at all.
 struct RelocalisationOptions {
   bool enabled = true;
   // Corners that a pose must explain. Of wrong places chance explains up to 12 (EuRoC).

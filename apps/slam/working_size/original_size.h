@@ -11,8 +11,8 @@
 
 namespace rotslam {
 
-/// What was found in reduced images, in pixels of the original ones. Where the images are not
-/// reduced nothing changes. Bearings, angles and covariances of rotations are the same for both.
+/// Converts results in pixels of reduced images to pixels of the original ones. Without reduction
+/// nothing changes. Bearings, angles and covariances of rotations are the same for both.
 
 /// Keypoints, their covariances, and their levels in the pyramid of the original images.
 /// @param level_scale  as WorkingSize::NumLevelsBelow.

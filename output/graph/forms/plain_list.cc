@@ -2,6 +2,8 @@
 
 #include <array>
 #include <cmath>
+#include <optional>
+#include <string>
 
 #include "output/graph/rotation_graph_form.h"
 #include "output/trajectory/unit_length.h"
@@ -32,8 +34,49 @@ bool IsEdgeOfNames(GraphLine line) {
   return count == 4 || count == 5 || count >= 9;
 }
 
+// The rotation of an edge, from the numbers behind its ids.
+struct PlainRotation {
+  Rotation rotation;
+  std::optional<double> sigma_rad;
+  bool is_quaternion = false;
+  bool is_longer = false;  // there are more numbers, which are not used
+};
+
+PlainRotation ReadRotation(GraphLine& line) {
+  std::array<double, 9> numbers{};
+  std::size_t count = 0;
+  while (!line.AtEnd() && count < numbers.size()) numbers[count++] = line.Number();
+  GraphLine rest = line;
+  while (!rest.AtEnd()) rest.Number();
+  PlainRotation read;
+  read.is_longer = !line.AtEnd();
+  if (count == 4 || count == 5) {
+    const Eigen::Quaterniond q(numbers[3], numbers[0], numbers[1], numbers[2]);
+    if (!IsUnitLength(q.norm())) line.Fail("the quaternion is not of unit length");
+    read.rotation = Rotation(q);
+    read.is_quaternion = true;
+    if (count == 5) {
+      const double sigma_rad = numbers[4] * kRadFromDeg;
+      if (!(sigma_rad > 0.0 && sigma_rad * sigma_rad > 0.0) ||
+          !std::isfinite(sigma_rad * sigma_rad)) {
+        line.Fail("expected a standard deviation in deg above zero behind the quaternion");
+      }
+      read.sigma_rad = sigma_rad;
+    }
+  } else if (count == 9) {
+    read.rotation = RotationOfNine(line, numbers);
+  } else {
+    line.Fail("expected i j and a quaternion or the nine numbers of a rotation matrix, found " +
+              std::to_string(count) + " numbers behind the ids");
+  }
+  return read;
+}
+
+std::string LinesText(int count) {
+  return " (" + std::to_string(count) + (count == 1 ? " line)" : " lines)");
+}
+
 RotationList ReadPlainList(const RotationGraphInput& input, double sigma_rad) {
-  const Eigen::Matrix3d isotropic = sigma_rad * sigma_rad * Eigen::Matrix3d::Identity();
   const bool has_numbers = IsWholeNumber(input.first_words.front());
   RotationGraphBuilder builder(input);
   bool has_quaternions = false;
@@ -56,44 +99,19 @@ RotationList ReadPlainList(const RotationGraphInput& input, double sigma_rad) {
     };
     const std::string i = take_id();
     const std::string j = take_id();
-    std::array<double, 9> numbers{};
-    std::size_t count = 0;
-    while (!line.AtEnd() && count < numbers.size()) numbers[count++] = line.Number();
-    GraphLine rest = line;
-    while (!rest.AtEnd()) rest.Number();
-    if (!line.AtEnd()) ++num_longer;
-    Rotation rotation;
-    Eigen::Matrix3d covariance = isotropic;
-    if (count == 4 || count == 5) {
-      const Eigen::Quaterniond q(numbers[3], numbers[0], numbers[1], numbers[2]);
-      if (!IsUnitLength(q.norm())) line.Fail("the quaternion is not of unit length");
-      rotation = Rotation(q);
-      has_quaternions = true;
-      if (count == 5) {
-        const double own_sigma_rad = numbers[4] * kRadFromDeg;
-        if (!(own_sigma_rad > 0.0 && own_sigma_rad * own_sigma_rad > 0.0) ||
-            !std::isfinite(own_sigma_rad * own_sigma_rad)) {
-          line.Fail("expected a standard deviation in deg above zero behind the quaternion");
-        }
-        covariance = own_sigma_rad * own_sigma_rad * Eigen::Matrix3d::Identity();
-        ++num_sigmas;
-      }
-    } else if (count == 9) {
-      rotation = RotationOfNine(line, numbers);
-      has_matrices = true;
-    } else {
-      line.Fail("expected i j and a quaternion or the nine numbers of a rotation matrix, found " +
-                std::to_string(count) + " numbers behind the ids");
-    }
-    builder.AddEdge(line, i, j, rotation, covariance);
+    const PlainRotation read = ReadRotation(line);
+    const double sigma = read.sigma_rad.value_or(sigma_rad);
+    builder.AddEdge(line, i, j, read.rotation, sigma * sigma * Eigen::Matrix3d::Identity());
+    (read.is_quaternion ? has_quaternions : has_matrices) = true;
+    num_longer += read.is_longer ? 1 : 0;
+    num_sigmas += read.sigma_rad ? 1 : 0;
   });
   if (num_longer > 0) {
-    builder.Note("the numbers behind the rotation are not used (" + std::to_string(num_longer) +
-                 (num_longer == 1 ? " line)" : " lines)"));
+    builder.Note("the numbers behind the rotation are not used" + LinesText(num_longer));
   }
   if (num_sigmas > 0) {
-    builder.Note("the fifth number behind the ids is the edge's standard deviation in deg (" +
-                 std::to_string(num_sigmas) + (num_sigmas == 1 ? " line)" : " lines)"));
+    builder.Note("the fifth number behind the ids is the edge's standard deviation in deg" +
+                 LinesText(num_sigmas));
   }
   std::vector<EdgeReading> readings = {{"x_j = R x_i", false, false, false},
                                        {"x_i = R x_j", true, false, false}};

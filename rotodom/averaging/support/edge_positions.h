@@ -12,7 +12,7 @@
 namespace rotslam {
 
 /// Centres that fit the translations of a graph's edges best, orientations being known: the linear
-/// least squares of weight |c_j - c_i - R_i^T t|^2.
+/// least squares of weight |c_j - c_i - R_i^T t|^2. Six parameters: the symbols of the formula.
 /// @param j_in_i    by edge, the position t of view j in the frame of view i.
 /// @param weights   by edge, 1/length^2; zero leaves an edge out.
 /// @param center_in_world  of the fixed views, and where a component's first view stays; the

@@ -24,7 +24,7 @@ struct BagTopic {
 /// Says whether the messages of a topic (its count is not known yet) will be read.
 using BagFilter = std::function<bool(const BagTopic&)>;
 
-/// Where one message lies.
+/// The position of one message in the file.
 struct BagEntry {
   static constexpr std::size_t kHeadSize = 12;
 
@@ -53,7 +53,7 @@ class BagReader {
   /// Messages of the wanted topics in order of time_ns; equal times in the order of the file.
   const std::vector<BagEntry>& entries() const { return entries_; }
 
-  /// What was left out and why, one line each: a file that is cut off, a chunk that is damaged.
+  /// The parts that were left out, with the reason, one line each: a truncated file, a bad chunk.
   const std::vector<std::string>& notes() const { return notes_; }
 
   /// The bytes of a message. Throws std::runtime_error, in one line that names the file, when they
@@ -76,7 +76,7 @@ class BagReader {
   void AddMessage(const BagEntry& entry, std::string_view head);
   bool IsWanted(std::size_t topic) const { return is_wanted_[topic]; }
 
-  // What will be told of when all is read.
+  // These are reported in notes() when all is read.
   void AddBadChunk(const std::string& reason);
   void AddMessageWithoutTopic() { ++num_without_topic_; }
 

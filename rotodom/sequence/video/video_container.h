@@ -11,7 +11,7 @@
 #include "rotodom/sequence/video/ffmpeg_pointer.h"
 #include "rotodom/sequence/video/video_orientation.h"
 
-// What FFmpeg's libraries say of files, streams and frames. Used by VideoFile alone.
+// Texts about files, streams and frames from FFmpeg's libraries. Used by VideoFile alone.
 
 struct AVDictionary;
 struct AVInputFormat;
@@ -51,7 +51,7 @@ std::int64_t CountPackets(const std::filesystem::path& path, int stream_index);
 std::optional<DisplayMatrix> FindDisplayMatrix(const AVFrame& frame, const AVStream& stream);
 bool IsInterlaced(const AVFrame& frame);
 
-/// What is wrong with a frame that was decoded all the same; empty: nothing.
+/// The damage of a frame that was decoded all the same; empty: none.
 std::string DamageOf(const AVFrame& frame);
 
 /// The fast conversions of swscale take an even number of rows. A decoder's buffers are larger than
@@ -62,7 +62,7 @@ void AddTags(const AVDictionary* tags, std::map<std::string, std::string>& metad
 
 // ---- texts
 
-/// What people call a container or codec of FFmpeg's name.
+/// The usual name of a container or codec that FFmpeg names otherwise.
 std::string PlainName(std::string_view name);
 std::string ContainerText(const AVFormatContext& container, const std::filesystem::path& path);
 std::string StreamText(const AVStream& stream);

@@ -39,21 +39,6 @@ constexpr const char* kVisitor = R"js(
 <script>
 (() => {
   const live = window.live;
-  const differences = (a, b) => {
-    let count = 0;
-    for (let k = 0; k < a.length; ++k) count += a[k] !== b[k];
-    return count;
-  };
-  const pixels = () => {
-    live.snapshot();
-    const source = document.querySelector('#view canvas');
-    const copy = document.createElement('canvas');
-    copy.width = source.width;
-    copy.height = source.height;
-    const context = copy.getContext('2d');
-    context.drawImage(source, 0, 0);
-    return context.getImageData(0, 0, copy.width, copy.height).data;
-  };
   const isLit = (canvas) =>
     canvas.getContext('2d').getImageData(0, 0, canvas.width, canvas.height).data.some((value) => value > 0);
   const until = (condition) => new Promise((resolve) => {
@@ -68,14 +53,14 @@ constexpr const char* kVisitor = R"js(
       const seen = {};
       await until(() => live.keyframes.count >= 3);
       await drawn();
-      const first = pixels();
+      const first = pixelsOf(live);
       seen.lit = first.filter((value, k) => k % 4 === 3 && value > 0).length;
       seen.start = live.markerPosition();
       const count = live.numFrames();
       await until(() => live.numFrames() >= count + 30);
       await drawn();
       seen.end = live.markerPosition();
-      seen.changed = differences(first, pixels());
+      seen.changed = differences(first, pixelsOf(live));
       seen.points = live.cloud.count;
       seen.keyframes = live.keyframes.count;
       seen.frames = live.numFrames();
@@ -120,7 +105,7 @@ class VisitedPage {
       ASSERT_NE(policy.find(images), std::string::npos);
       policy.insert(policy.find(images) + images.size(), "'self' ");
       response.set_header("Content-Security-Policy", policy);
-      response.set_content(page->body + kVisitor, "text/html; charset=utf-8");
+      response.set_content(page->body + kPixelScript + kVisitor, "text/html; charset=utf-8");
     });
     server_.Get("/events", [this, port](const httplib::Request&, httplib::Response& response) {
       ++num_visits_;

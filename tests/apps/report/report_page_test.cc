@@ -30,31 +30,16 @@ constexpr const char* kVisitor = R"js(
   try {
     const report = window.report;
     const slider = document.getElementById('slider');
-    const differences = (a, b) => {
-      let count = 0;
-      for (let k = 0; k < a.length; ++k) count += a[k] !== b[k];
-      return count;
-    };
-    const pixels = () => {
-      report.snapshot();
-      const source = document.querySelector('#view canvas');
-      const copy = document.createElement('canvas');
-      copy.width = source.width;
-      copy.height = source.height;
-      const context = copy.getContext('2d');
-      context.drawImage(source, 0, 0);
-      return context.getImageData(0, 0, copy.width, copy.height).data;
-    };
     seen.ready = report.ready;
     seen.slider_max = Number(slider.max);
-    const first = pixels();
+    const first = pixelsOf(report);
     seen.lit = first.filter((value, k) => k % 4 === 3 && value > 0).length;
     seen.start = report.markerPosition();
     slider.value = slider.max;
     slider.dispatchEvent(new Event('input'));
     seen.end = report.markerPosition();
     seen.frame = report.frame();
-    seen.changed = differences(first, pixels());
+    seen.changed = differences(first, pixelsOf(report));
     seen.clock = document.getElementById('clock').textContent;
     seen.facts = [...document.querySelectorAll('.fact')].map((fact) => fact.innerText || fact.textContent);
     seen.notes = [...document.querySelectorAll('.note')].map((note) => note.textContent);
@@ -107,7 +92,7 @@ class ReportPage : public testing::Test {
     EXPECT_EQ(result.exit_code, 0) << result.error;
     const TemporaryFolder folder;
     const fs::path page =
-        folder.Write("visited.html", ReadWholeFile(out / "report.html") + kVisitor);
+        folder.Write("visited.html", ReadWholeFile(out / "report.html") + kPixelScript + kVisitor);
     const fs::path dom = folder.path() / "dom";
     const fs::path log = folder.path() / "log";
     const std::string line = ChromiumCommand("file://" + page.string(),

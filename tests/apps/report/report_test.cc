@@ -13,7 +13,7 @@
 #include <opencv2/imgcodecs.hpp>
 
 #include "apps/page/camera_angles.h"
-#include "apps/report/figures.h"
+#include "apps/report/figures/figures.h"
 #include "apps/report/page.h"
 #include "apps/report/page_data.h"
 #include "apps/report/run_data.h"

@@ -31,6 +31,14 @@ PointScene SightsOfPoints(const SceneOptions& options) {
   return points;
 }
 
+// The projection of a known point into a view of unknown centre.
+AffineProjection ProjectionFromCenter(const Eigen::Matrix3d& R_c_w,
+                                      const Eigen::Vector3d& point_in_world,
+                                      const Eigen::Vector2d& xy) {
+  const AffineProjection projection = ProjectionOfPoint(R_c_w, point_in_world, xy);
+  return {-projection.A, -projection.b};
+}
+
 std::vector<std::vector<AffineProjection>> ProjectionsFromCenters(const Scene& scene) {
   std::map<FrameId, std::vector<AffineProjection>> projections;
   for (const Track& track : scene.tracks) {

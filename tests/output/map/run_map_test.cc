@@ -125,7 +125,7 @@ TEST(RunMap, BelievesNoBrokenFile) {
 
 TEST(RunMap, KeyframesKeepTheirSightingsOnly) {
   const RunMap map = MapOfScene(ExportScene());
-  const RunMap part = KeyframesOnly(map);
+  const RunMap part = PartOf(map, KeyframesOf(map));
   std::set<FrameId> frames;
   for (const MapFrame& frame : part.frames) frames.insert(frame.id);
   EXPECT_EQ(frames.size(), 6u);  // of nine

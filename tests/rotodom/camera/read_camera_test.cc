@@ -10,6 +10,8 @@
 #include <gtest/gtest.h>
 #include <unistd.h>
 
+#include "tests/rotodom/camera/calibration_text.h"
+
 namespace rotslam {
 namespace {
 
@@ -44,22 +46,6 @@ class ReadCameraTest : public testing::Test {
       fs::path(testing::TempDir()) / ("rotslam_read_camera_" + std::to_string(getpid()));
 };
 
-Camera Make(CameraModel model,
-            const std::array<int, 2>& size,
-            const std::array<double, 4>& intrinsics,
-            const std::array<double, 8>& distortion = {}) {
-  Camera camera;
-  camera.model = model;
-  camera.width = size[0];
-  camera.height = size[1];
-  camera.fx = intrinsics[0];
-  camera.fy = intrinsics[1];
-  camera.cx = intrinsics[2];
-  camera.cy = intrinsics[3];
-  camera.distortion = distortion;
-  return camera;
-}
-
 TEST_F(ReadCameraTest, OursHasMaskedPolygons) {
   const std::string global =
       "model: pinhole\nwidth: 640\nheight: 480\nfx: 500\nfy: 500\ncx: 320\ncy: 240\n";
@@ -87,12 +73,15 @@ TEST_F(ReadCameraTest, OursHasMaskedPolygons) {
 TEST_F(ReadCameraTest, OursGivesBackWhatWasWritten) {
   const double third = 1.0 / 3.0;
   for (const Camera& camera :
-       {Make(CameraModel::kPinhole, {0, 0}, {500.0 + third, 501.0, 320.1, -2.5}),
-        Make(CameraModel::kRadtan, {640, 480}, {5e2, 1e-3, 0, 1}, {third, -0.1, 1e-17, 0, 2}),
-        Make(CameraModel::kRadtan, {640, 480}, {5e2, 5e2, 0, 1}),
-        Make(CameraModel::kEquidistant, {64, 48}, {190, 191, 32, 24}, {0.1, third, -1e-9, 4}),
-        Make(CameraModel::kRational, {64, 48}, {190, 191, 32, 24}, {3, 1, 0, third, 5, 6, 7, 8}),
-        Make(CameraModel::kFov, {64, 48}, {190, 191, 32, 24}, {0.9})}) {
+       {CameraOfNumbers(CameraModel::kPinhole, {0, 0}, {500.0 + third, 501.0, 320.1, -2.5}),
+        CameraOfNumbers(
+            CameraModel::kRadtan, {640, 480}, {5e2, 1e-3, 0, 1}, {third, -0.1, 1e-17, 0, 2}),
+        CameraOfNumbers(CameraModel::kRadtan, {640, 480}, {5e2, 5e2, 0, 1}),
+        CameraOfNumbers(
+            CameraModel::kEquidistant, {64, 48}, {190, 191, 32, 24}, {0.1, third, -1e-9, 4}),
+        CameraOfNumbers(
+            CameraModel::kRational, {64, 48}, {190, 191, 32, 24}, {3, 1, 0, third, 5, 6, 7, 8}),
+        CameraOfNumbers(CameraModel::kFov, {64, 48}, {190, 191, 32, 24}, {0.9})}) {
     WriteCameraYaml(folder_ / "camera.yaml", camera);
     EXPECT_EQ(ReadCamera(folder_ / "camera.yaml"), camera) << CameraYaml(camera);
     EXPECT_EQ(ReadCamera(folder_), camera);  // the folder stands for it
@@ -102,15 +91,17 @@ TEST_F(ReadCameraTest, OursGivesBackWhatWasWritten) {
 
 TEST_F(ReadCameraTest, OursSaysHowWellTheLensIsKnown) {
   LensSigmas sigmas = {0.5, 1.0 / 3.0, 1e-7, {0.01, 0.0, 1e-5, 2e-5, 0.1}};
-  const Camera radtan = Make(CameraModel::kRadtan, {640, 480}, {5e2, 5e2, 0, 1}, {0.1, 0.2});
-  const Camera pinhole = Make(CameraModel::kPinhole, {640, 480}, {5e2, 5e2, 0, 1});
+  const Camera radtan =
+      CameraOfNumbers(CameraModel::kRadtan, {640, 480}, {5e2, 5e2, 0, 1}, {0.1, 0.2});
+  const Camera pinhole = CameraOfNumbers(CameraModel::kPinhole, {640, 480}, {5e2, 5e2, 0, 1});
   const auto read = [&] { return ReadCameraFile(folder_ / "camera.yaml").cameras.at(0); };
   for (const Camera& camera : {radtan, pinhole}) {
     WriteCameraYaml(folder_ / "camera.yaml", camera, sigmas);
     EXPECT_EQ(read().camera, camera);
     EXPECT_EQ(read().sigmas, sigmas) << CameraYaml(camera, sigmas);
   }
-  const Camera fisheye = Make(CameraModel::kEquidistant, {64, 48}, {190, 191, 32, 24}, {0.1});
+  const Camera fisheye =
+      CameraOfNumbers(CameraModel::kEquidistant, {64, 48}, {190, 191, 32, 24}, {0.1});
   WriteCameraYaml(folder_ / "camera.yaml", fisheye, sigmas);
   sigmas.distortion[4] = 0.0;
   EXPECT_EQ(read().sigmas, sigmas);
@@ -178,23 +169,24 @@ TEST_F(ReadCameraTest, OrbSlam) {
                  "Camera.k3: 1.163314\n\nCamera.fps: 30.0\nCamera.RGB: 1\n"
                  "LEFT.D: !!opencv-matrix\n   rows: 1\n   cols: 2\n   dt: d\n"
                  "   data: [-0.28, 0.07]\n"),
-            Make(CameraModel::kRadtan,
-                 {0, 0},
-                 {517.306408, 516.469215, 318.64304, 255.313989},
-                 {0.262383, -0.953104, -0.005358, 0.002628, 1.163314}));
-  EXPECT_EQ(Read("%YAML:1.0\n---\nCamera.fx: 718.856\nCamera.fy: 718.856\nCamera.cx: 607.1928\n"
-                 "Camera.cy: 185.2157\nCamera.k1: 0.0\nCamera.k2: 0.0\nCamera.p1: 0.0\n"
-                 "Camera.p2: 0.0\nCamera.width: 1241\nCamera.height: 376\n"),
-            Make(CameraModel::kPinhole, {1241, 376}, {718.856, 718.856, 607.1928, 185.2157}));
+            CameraOfNumbers(CameraModel::kRadtan,
+                            {0, 0},
+                            {517.306408, 516.469215, 318.64304, 255.313989},
+                            {0.262383, -0.953104, -0.005358, 0.002628, 1.163314}));
+  EXPECT_EQ(
+      Read("%YAML:1.0\n---\nCamera.fx: 718.856\nCamera.fy: 718.856\nCamera.cx: 607.1928\n"
+           "Camera.cy: 185.2157\nCamera.k1: 0.0\nCamera.k2: 0.0\nCamera.p1: 0.0\n"
+           "Camera.p2: 0.0\nCamera.width: 1241\nCamera.height: 376\n"),
+      CameraOfNumbers(CameraModel::kPinhole, {1241, 376}, {718.856, 718.856, 607.1928, 185.2157}));
   EXPECT_EQ(Read("%YAML:1.0\nFile.version: \"1.0\"\nCamera.type: \"KannalaBrandt8\"\n"
                  "Camera1.fx: 190.97\nCamera1.fy: 190.98\nCamera1.cx: 254.93\n"
                  "Camera1.cy: 256.89\nCamera1.k1: 0.0034\nCamera1.k2: 0.0007\n"
                  "Camera1.k3: -0.002\nCamera1.k4: 0.0002\nCamera.width: 512\n"
                  "Camera.height: 512\n"),
-            Make(CameraModel::kEquidistant,
-                 {512, 512},
-                 {190.97, 190.98, 254.93, 256.89},
-                 {0.0034, 0.0007, -0.002, 0.0002}));
+            CameraOfNumbers(CameraModel::kEquidistant,
+                            {512, 512},
+                            {190.97, 190.98, 254.93, 256.89},
+                            {0.0034, 0.0007, -0.002, 0.0002}));
   EXPECT_THAT(Complaint("%YAML:1.0\nCamera.fy: 500\nCamera.cx: 3\nCamera.cy: 2\n"),
               HasSubstr("Camera.fx is missing"));
   EXPECT_THAT(Complaint("Camera.type: \"MLPnP\"\nCamera.fx: 500\n"), HasSubstr("Camera.type"));
@@ -208,18 +200,18 @@ TEST_F(ReadCameraTest, Kalibr) {
                  "  distortion_coeffs: [-0.28, 0.07, 0.0002, 1.7e-05]\n"
                  "  distortion_model: radtan\n  intrinsics: [458.6, 457.2, 367.2, 248.3]\n"
                  "  resolution: [752, 480]\n  rostopic: /cam0/image_raw\n"),
-            Make(CameraModel::kRadtan,
-                 {752, 480},
-                 {458.6, 457.2, 367.2, 248.3},
-                 {-0.28, 0.07, 0.0002, 1.7e-05}));
-  EXPECT_EQ(
-      Read("cam0: {camera_model: pinhole, distortion_model: equidistant,\n"
-           "  distortion_coeffs: [0.1, 0.2, 0.3, 0.4], intrinsics: [190, 191, 254, 256],\n"
-           "  resolution: [512, 512]}\n"),
-      Make(CameraModel::kEquidistant, {512, 512}, {190, 191, 254, 256}, {0.1, 0.2, 0.3, 0.4}));
+            CameraOfNumbers(CameraModel::kRadtan,
+                            {752, 480},
+                            {458.6, 457.2, 367.2, 248.3},
+                            {-0.28, 0.07, 0.0002, 1.7e-05}));
+  EXPECT_EQ(Read("cam0: {camera_model: pinhole, distortion_model: equidistant,\n"
+                 "  distortion_coeffs: [0.1, 0.2, 0.3, 0.4], intrinsics: [190, 191, 254, 256],\n"
+                 "  resolution: [512, 512]}\n"),
+            CameraOfNumbers(
+                CameraModel::kEquidistant, {512, 512}, {190, 191, 254, 256}, {0.1, 0.2, 0.3, 0.4}));
   EXPECT_EQ(Read("cam0: {camera_model: pinhole, distortion_model: none, distortion_coeffs: [],\n"
                  "  intrinsics: [190, 191, 254, 256], resolution: [512, 512]}\n"),
-            Make(CameraModel::kPinhole, {512, 512}, {190, 191, 254, 256}));
+            CameraOfNumbers(CameraModel::kPinhole, {512, 512}, {190, 191, 254, 256}));
   EXPECT_THAT(Complaint("cam0: {camera_model: omni, intrinsics: [1, 190, 191, 254, 256]}\n"),
               HasSubstr("cam0.camera_model is 'omni'"));
   EXPECT_THAT(Complaint("cam0: {camera_model: pinhole, distortion_model: radtan}\n"),
@@ -236,7 +228,7 @@ TEST_F(ReadCameraTest, Kitti) {
   const std::string p0 =
       "P0: 7.18856e+02 0.0e+00 6.071928e+02 0.0 0.0 7.18857e+02 1.852157e+02 0.0 0.0 0.0 1.0 0.0\n";
   EXPECT_EQ(Read(p0 + "Tr: 1 2\n"),
-            Make(CameraModel::kPinhole, {0, 0}, {718.856, 718.857, 607.1928, 185.2157}));
+            CameraOfNumbers(CameraModel::kPinhole, {0, 0}, {718.856, 718.857, 607.1928, 185.2157}));
   EXPECT_THAT(Complaint("P0: 718.856 0 607 0 0 718\n"), HasSubstr("P0 has 6 values"));
   EXPECT_THAT(Complaint("P0: 0 0 607 0 0 718 185 0 0 0 1 0\n"), HasSubstr("focal length"));
   EXPECT_THAT(Complaint("P0: 718 1 607 0 0 718 185 0 0 0 1 0\n"),
@@ -251,40 +243,45 @@ TEST_F(ReadCameraTest, Euroc) {
       "resolution: [752, 480]\ncamera_model: pinhole\n"
       "intrinsics: [458.654, 457.296, 367.215, 248.375] #fu, fv, cu, cv\n";
   const std::array<double, 4> intrinsics = {458.654, 457.296, 367.215, 248.375};
+  EXPECT_EQ(Read(sensor + "distortion_model: radial-tangential\n"
+                          "distortion_coefficients: [-0.283, 0.074, 0.000194, 1.76e-05]\n"),
+            CameraOfNumbers(
+                CameraModel::kRadtan, {752, 480}, intrinsics, {-0.283, 0.074, 0.000194, 1.76e-05}));
   EXPECT_EQ(
-      Read(sensor + "distortion_model: radial-tangential\n"
-                    "distortion_coefficients: [-0.283, 0.074, 0.000194, 1.76e-05]\n"),
-      Make(CameraModel::kRadtan, {752, 480}, intrinsics, {-0.283, 0.074, 0.000194, 1.76e-05}));
-  EXPECT_EQ(Read(sensor + "distortion_model: equidistant\n"
-                          "distortion_coefficients: [0.1, 0.2, 0.3, 0.4]\n"),
-            Make(CameraModel::kEquidistant, {752, 480}, intrinsics, {0.1, 0.2, 0.3, 0.4}));
+      Read(sensor + "distortion_model: equidistant\n"
+                    "distortion_coefficients: [0.1, 0.2, 0.3, 0.4]\n"),
+      CameraOfNumbers(CameraModel::kEquidistant, {752, 480}, intrinsics, {0.1, 0.2, 0.3, 0.4}));
 }
 
 TEST_F(ReadCameraTest, Colmap) {
   const std::string header = "# Camera list with one line of data per camera:\n\n";
   EXPECT_EQ(Read(header + "1 SIMPLE_PINHOLE 640 480 500 320 240\n"),
-            Make(CameraModel::kPinhole, {640, 480}, {500, 500, 319.5, 239.5}));
+            CameraOfNumbers(CameraModel::kPinhole, {640, 480}, {500, 500, 319.5, 239.5}));
   EXPECT_EQ(Read(header + "7 PINHOLE 640 480 500 501 320 240\n"),
-            Make(CameraModel::kPinhole, {640, 480}, {500, 501, 319.5, 239.5}));
+            CameraOfNumbers(CameraModel::kPinhole, {640, 480}, {500, 501, 319.5, 239.5}));
   EXPECT_EQ(Read(header + "1 SIMPLE_RADIAL 640 480 500 320 240 0.1\n"),
-            Make(CameraModel::kRadtan, {640, 480}, {500, 500, 319.5, 239.5}, {0.1}));
-  EXPECT_EQ(Read(header + "1 RADIAL 640 480 500 320 240 0.1 -0.2\n"),
-            Make(CameraModel::kRadtan, {640, 480}, {500, 500, 319.5, 239.5}, {0.1, -0.2}));
+            CameraOfNumbers(CameraModel::kRadtan, {640, 480}, {500, 500, 319.5, 239.5}, {0.1}));
+  EXPECT_EQ(
+      Read(header + "1 RADIAL 640 480 500 320 240 0.1 -0.2\n"),
+      CameraOfNumbers(CameraModel::kRadtan, {640, 480}, {500, 500, 319.5, 239.5}, {0.1, -0.2}));
   EXPECT_EQ(Read(header + "1 OPENCV 640 480 500 501 320 240 0.1 0.2 0.3 0.4\n"),
-            Make(CameraModel::kRadtan, {640, 480}, {500, 501, 319.5, 239.5}, {0.1, 0.2, 0.3, 0.4}));
+            CameraOfNumbers(
+                CameraModel::kRadtan, {640, 480}, {500, 501, 319.5, 239.5}, {0.1, 0.2, 0.3, 0.4}));
   EXPECT_EQ(
       Read(header + "1 OPENCV_FISHEYE 640 480 500 501 320 240 0.1 0.2 0.3 0.4\n"),
-      Make(CameraModel::kEquidistant, {640, 480}, {500, 501, 319.5, 239.5}, {0.1, 0.2, 0.3, 0.4}));
+      CameraOfNumbers(
+          CameraModel::kEquidistant, {640, 480}, {500, 501, 319.5, 239.5}, {0.1, 0.2, 0.3, 0.4}));
   EXPECT_EQ(
       Read(header + "1 FULL_OPENCV 640 480 500 501 320 240 0.1 0.2 0.3 0.4 0.5 0 0 0\n"),
-      Make(CameraModel::kRadtan, {640, 480}, {500, 501, 319.5, 239.5}, {0.1, 0.2, 0.3, 0.4, 0.5}));
+      CameraOfNumbers(
+          CameraModel::kRadtan, {640, 480}, {500, 501, 319.5, 239.5}, {0.1, 0.2, 0.3, 0.4, 0.5}));
   EXPECT_EQ(Read(header + "1 FULL_OPENCV 640 480 500 501 320 240 0.1 0.2 0.3 0.4 0.5 0 0.6 0\n"),
-            Make(CameraModel::kRational,
-                 {640, 480},
-                 {500, 501, 319.5, 239.5},
-                 {0.1, 0.2, 0.3, 0.4, 0.5, 0, 0.6, 0}));
+            CameraOfNumbers(CameraModel::kRational,
+                            {640, 480},
+                            {500, 501, 319.5, 239.5},
+                            {0.1, 0.2, 0.3, 0.4, 0.5, 0, 0.6, 0}));
   EXPECT_EQ(Read("1 FOV 640 480 500 501 320 240 0.9\n"),
-            Make(CameraModel::kFov, {640, 480}, {500, 501, 319.5, 239.5}, {0.9}));
+            CameraOfNumbers(CameraModel::kFov, {640, 480}, {500, 501, 319.5, 239.5}, {0.9}));
   EXPECT_THAT(Complaint("1 PINHOLE 640 480 500 320 240\n"), HasSubstr("3 parameters"));
   EXPECT_THAT(Complaint("1 PINHOLE 640 480 500 0 320 240\n"), HasSubstr("camera 1: fy is '0'"));
   EXPECT_EQ(Read("1 SIMPLE_PINHOLE 640 480 500 320 240\n2 PINHOLE 640 480 500 500 320 240\n").fx,
@@ -330,11 +327,11 @@ TEST_F(ReadCameraTest, ComplaintsNameFileAndKey) {
 TEST_F(ReadCameraTest, TakesNumbersAsOpenCvAndWindowsWriteThem) {
   EXPECT_EQ(Read("%YAML:1.0\r\nCamera.fx: 525.\r\nCamera.fy: +5.25e+02\r\nCamera.cx: 320.\r\n"
                  "Camera.cy: 240.\r\n"),
-            Make(CameraModel::kPinhole, {0, 0}, {525, 525, 320, 240}));
+            CameraOfNumbers(CameraModel::kPinhole, {0, 0}, {525, 525, 320, 240}));
 }
 
 TEST_F(ReadCameraTest, WritingComplainsToo) {
-  const Camera camera = Make(CameraModel::kPinhole, {0, 0}, {500, 500, 320, 240});
+  const Camera camera = CameraOfNumbers(CameraModel::kPinhole, {0, 0}, {500, 500, 320, 240});
   EXPECT_THROW(WriteCameraYaml(folder_ / "no" / "camera.yaml", camera), std::runtime_error);
   EXPECT_THROW(WriteCameraYaml(folder_ / "camera.yaml", Camera()), std::invalid_argument);
 }

@@ -1,10 +1,13 @@
 #include "rotodom/view_graph/fisheye_check.h"
 
 #include <algorithm>
+#include <map>
 #include <random>
 #include <vector>
 
 #include <gtest/gtest.h>
+
+#include "tests/rotodom/self_calibration/filmed_room.h"
 
 namespace rotslam {
 namespace {
@@ -50,45 +53,36 @@ Footage Film(const Camera& camera) {
   return footage;
 }
 
-Camera OfModel(CameraModel model, double focal_px) {
-  Camera camera;
-  camera.model = model;
-  camera.width = 640;
-  camera.height = 480;
-  camera.fx = camera.fy = focal_px;
-  camera.cx = 319.5;
-  camera.cy = 239.5;
-  return camera;
-}
-
 FisheyeCheck Check(const Camera& given, const Camera& true_camera) {
   const Footage footage = Film(true_camera);
   return CheckForFisheye(given, footage.features, footage.graph, {});
 }
 
 TEST(CheckForFisheye, NoticesOneThatIsGivenAsAPinhole) {
-  const Camera fisheye = OfModel(CameraModel::kEquidistant, 200.0);
+  const Camera fisheye = LensOfModel(CameraModel::kEquidistant, 200.0);
   for (const double focal_px : {180.0, 200.0, 250.0}) {
-    const FisheyeCheck check = Check(OfModel(CameraModel::kPinhole, focal_px), fisheye);
+    const FisheyeCheck check = Check(LensOfModel(CameraModel::kPinhole, focal_px), fisheye);
     EXPECT_TRUE(check.IsFisheye()) << focal_px << ": " << check.num_by_camera << " and "
                                    << check.num_by_fisheye << " of " << check.num_points;
   }
 }
 
 TEST(CheckForFisheye, RefusesNoRightCamera) {
-  Camera barrel = OfModel(CameraModel::kRadtan, 300.0);
+  Camera barrel = LensOfModel(CameraModel::kRadtan, 300.0);
   barrel.distortion = {-0.25, 0.06};
-  for (const Camera& camera :
-       {OfModel(CameraModel::kPinhole, 300.0), barrel, OfModel(CameraModel::kEquidistant, 200.0)}) {
+  for (const Camera& camera : {LensOfModel(CameraModel::kPinhole, 300.0),
+                               barrel,
+                               LensOfModel(CameraModel::kEquidistant, 200.0)}) {
     EXPECT_FALSE(Check(camera, camera).IsFisheye()) << Describe(camera);
   }
   // Nor one whose focal length is off.
-  EXPECT_FALSE(Check(OfModel(CameraModel::kPinhole, 360.0), OfModel(CameraModel::kPinhole, 300.0))
-                   .IsFisheye());
+  EXPECT_FALSE(
+      Check(LensOfModel(CameraModel::kPinhole, 360.0), LensOfModel(CameraModel::kPinhole, 300.0))
+          .IsFisheye());
 }
 
 TEST(CheckForFisheye, TakesNoPairsOfANarrowView) {
-  const Camera narrow = OfModel(CameraModel::kPinhole, 900.0);
+  const Camera narrow = LensOfModel(CameraModel::kPinhole, 900.0);
   EXPECT_EQ(Check(narrow, narrow).num_pairs, 0);
 }
 

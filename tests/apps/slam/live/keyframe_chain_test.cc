@@ -99,7 +99,8 @@ TEST(CloseLinks, TakesOutDriftOfRotationAndScale) {
   EXPECT_LT(LargestError(closed, again, closed), 1e-9);
 }
 
-// A link tells the scale of a part whose scale is a guess, and leaves that of the part before it.
+// A link tells the scale of a component whose scale is a guess, and leaves that of the one before
+// it.
 TEST(CloseLinks, FindsTheScaleOfAPart) {
   const KeyframeChain truth = Circle();
   KeyframeChain chain = truth;
@@ -107,7 +108,7 @@ TEST(CloseLinks, FindsTheScaleOfAPart) {
   const Eigen::Vector3d origin = truth.at(boundary).center_in_world;
   for (auto& [frame, keyframe] : chain) {
     if (frame <= boundary) continue;
-    keyframe.part = 1;
+    keyframe.component = 1;
     keyframe.center_in_world = origin + 1.5 * (keyframe.center_in_world - origin);
   }
   PlaceLink link;
@@ -120,7 +121,7 @@ TEST(CloseLinks, FindsTheScaleOfAPart) {
   EXPECT_LT(LargestError(chain, moves, truth), 0.2);
 }
 
-TEST(BendTo, FollowsAveragedOrientationsAndKeepsNeighbours) {
+TEST(FollowAveraged, FollowsAveragedOrientationsAndKeepsNeighbours) {
   const KeyframeChain truth = Circle();
   const KeyframeChain drifted = Drifted(truth, 0.2 * kRadFromDeg, 1.0);
   // Averaged in another world, with an error of their own from one keyframe to the next.
@@ -132,7 +133,7 @@ TEST(BendTo, FollowsAveragedOrientationsAndKeepsNeighbours) {
     averaged[frame] = Rotation::Exp({error, 0.0, 0.0}) * keyframe.cam_from_world * world;
     ++k;
   }
-  const RotationMap bent = BendTo(averaged, drifted);
+  const RotationMap bent = FollowAveraged(averaged, drifted);
   EXPECT_LT((bent.rbegin()->second * truth.rbegin()->second.cam_from_world.Inverse()).AngleDeg(),
             1e-6);
   const auto middle = std::next(truth.begin(), kCircleKeyframes / 2);

@@ -192,9 +192,9 @@ TEST(LiveSlam, HoldsThePositionWhileTheCameraTurns) {
       });
   EXPECT_GT(num_without, 0);
   EXPECT_GE(num_late, num_without / 2);
-  // The map goes on behind it, in a part of its own.
+  // The map goes on behind it, in a component of its own.
   EXPECT_EQ(estimates.back().state, LiveState::kTracking);
-  EXPECT_EQ(slam.Map()->keyframes.back().part, 1);
+  EXPECT_EQ(slam.Map()->keyframes.back().component, 1);
 }
 
 }  // namespace

@@ -6,6 +6,7 @@
 #include <gtest/gtest.h>
 
 #include "rotodom/averaging/support/edge_positions.h"
+#include "rotodom/averaging/support/orientation_deviations.h"
 #include "tests/scenes/wrong_edges.h"
 
 namespace rotslam {

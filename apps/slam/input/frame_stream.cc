@@ -1,4 +1,4 @@
-#include "apps/slam/frame_stream.h"
+#include "apps/slam/input/frame_stream.h"
 
 #include <utility>
 

@@ -2,7 +2,7 @@
 
 #include <vector>
 
-#include "apps/report/drawing.h"
+#include "apps/report/figures/drawing.h"
 #include "apps/report/run_data.h"
 
 namespace rotslam {

@@ -18,7 +18,7 @@ struct TrackedFrame {
   LoopedEstimate estimate;
 };
 
-/// What frames pass through.
+/// The stages through which every frame passes.
 struct TrackingTools {
   LoopedOdometry& odometry;
   StaticContentDecision& static_content;  // receives the images

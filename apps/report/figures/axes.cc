@@ -1,4 +1,4 @@
-#include "apps/report/axes.h"
+#include "apps/report/figures/axes.h"
 
 #include <algorithm>
 #include <cmath>

@@ -5,7 +5,7 @@
 
 #include <Eigen/Core>
 
-#include "apps/report/drawing.h"
+#include "apps/report/figures/drawing.h"
 
 namespace rotslam {
 

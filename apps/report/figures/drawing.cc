@@ -1,4 +1,4 @@
-#include "apps/report/drawing.h"
+#include "apps/report/figures/drawing.h"
 
 #include <cmath>
 #include <memory>

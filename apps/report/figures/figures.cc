@@ -1,4 +1,4 @@
-#include "apps/report/figures.h"
+#include "apps/report/figures/figures.h"
 
 #include <algorithm>
 #include <array>
@@ -10,8 +10,8 @@
 #include <Eigen/Geometry>
 
 #include "apps/page/camera_angles.h"
-#include "apps/report/axes.h"
-#include "apps/report/stage_figures.h"
+#include "apps/report/figures/axes.h"
+#include "apps/report/figures/stage_figures.h"
 #include "rotodom/types/text_file.h"
 
 namespace rotslam {
