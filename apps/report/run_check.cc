@@ -160,6 +160,17 @@ Reason BreaksInTheGraph(const RunFacts& facts) {
                          "begin"};
 }
 
+Reason WeakTies(const RunFacts& facts) {
+  const int ties = IntegerIn(facts, "/counts/weak_ties");
+  if (ties == 0) return {};
+  return CheckReason{Verdict::kLookAt,
+                     kAllFrames,
+                     "a few matches alone tie the frames before and after a change of view, " +
+                         std::to_string(ties) + (ties == 1 ? " time" : " times") +
+                         "; the rotation across can be wrong by degrees. `weak|searched_wide` in "
+                         "rotations.csv marks where"};
+}
+
 Reason OtherFocalLength(const RunFacts& facts) {
   const nlohmann::ordered_json::json_pointer place("/lens_checks/focal/contradicts");
   if (!facts.summary.contains(place) || !facts.summary.at(place).get<bool>()) return {};
@@ -320,10 +331,11 @@ Reason LoopsRefused(const RunFacts& facts) {
 }
 
 // One reason each; the order is that of the output among equal verdicts.
-constexpr std::array<ReasonOf, 17> kReasons = {Interrupted,
+constexpr std::array<ReasonOf, 18> kReasons = {Interrupted,
                                                UnplacedFrames,
                                                UntiedScale,
                                                BreaksInTheGraph,
+                                               WeakTies,
                                                LeavesOdometry,
                                                HeldToOdometry,
                                                ExtrapolatedFrames,

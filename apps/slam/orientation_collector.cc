@@ -79,20 +79,6 @@ void TakeResults(LoopedOdometry& odometry, bool keep_features, Orientations& ori
   static_cast<OdometryResult&>(orientations) = odometry.TakeResult();
 }
 
-// Whether orientations are given for the frames on both sides of a break.
-bool IsBridged(const GivenRotations& given, FrameId frame) {
-  constexpr int kFarthest = 30;  // frames; whatever moves less is tracked that long
-  const auto num_frames = static_cast<int>(given.fusion.source.size());
-  const auto counts = [&](int k) { return given.CountsFor(FrameId{k}); };
-  bool is_before = false;
-  for (int k = std::max(0, frame.value - kFarthest); k < frame.value; ++k) is_before |= counts(k);
-  bool is_after = false;
-  for (int k = frame.value; k < std::min(num_frames, frame.value + kFarthest); ++k) {
-    is_after |= counts(k);
-  }
-  return is_before && is_after;
-}
-
 // Puts given orientations together with those of the images.
 void UseGiven(const OrientationsFromElsewhere& elsewhere, Orientations& orientations) {
   orientations.given = MatchGivenRotations(elsewhere, orientations.timestamps_s, orientations);

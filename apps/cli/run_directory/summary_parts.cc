@@ -10,6 +10,7 @@
 
 #include "apps/cli/input/lens_guess.h"
 #include "apps/cli/run_directory/map_segments.h"
+#include "apps/slam/connected_frames.h"
 #include "output/tables/lens_curve.h"
 #include "output/tables/poses_csv.h"
 
@@ -82,6 +83,7 @@ SummaryTable CountsOf(const Orientations& orientations) {
           {"frames_with_weak_edge", std::int64_t{orientations.num_weak}},
           {"frames_searched_wide", CountIf(orientations.reports, &FrameReport::searched_wide)},
           {"breaks", Count(orientations.breaks)},
+          {"weak_ties", Count(FindWeakTies(orientations))},
           {"edges", Count(orientations.graph.edges())}};
 }
 

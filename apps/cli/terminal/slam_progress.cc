@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "apps/cli/terminal/describe.h"
+#include "apps/slam/connected_frames.h"
 #include "apps/slam/map_result.h"
 #include "apps/slam/orientations.h"
 #include "apps/slam/working_size/original_size.h"
@@ -199,6 +200,15 @@ void WarnOfBreaks(const std::vector<FrameId>& breaks, Progress& progress) {
   }
 }
 
+void WarnOfWeakTies(const std::vector<FrameId>& ties, Progress& progress) {
+  for (const FrameId frame : ties) {
+    progress.Warn("frame " + std::to_string(frame.value) +
+                  " shares only a few matches with those before it: how far the camera turned "
+                  "there can be wrong by degrees, and so can the direction of everything after "
+                  "it. Film such changes of view more slowly, or run the parts one by one");
+  }
+}
+
 // Warns of images of a fisheye lens whose calibration has another projection.
 void WarnOfFisheye(const Orientations& orientations, Progress& progress) {
   const FisheyeCheck& check = orientations.fisheye;
@@ -368,6 +378,7 @@ void SlamProgress::OnEnd(SlamStage /*stage*/, const Orientations& orientations) 
   WarnOfZooms(orientations.zooms, progress_);
   WarnOfRotationScale(orientations.loops, progress_);
   WarnOfBreaks(orientations.breaks, progress_);
+  WarnOfWeakTies(FindWeakTies(orientations), progress_);
 }
 
 void SlamProgress::OnEnd(SlamStage stage, const MapResult& map) {

@@ -40,11 +40,10 @@ Eigen::Vector3d Ahead(int frame) { return {0.0, 0.0, 0.1 * frame}; }
 Eigen::Vector3d OnTheSpot(int) { return Eigen::Vector3d::Zero(); }
 
 // The zooms in what a camera sees that is calibrated as it was in the first frame: points from 4 to
-// 12 units away, with a noise of 0.3 px. The edges have the rotations that a wrong focal length
-// leaves: the true ones.
+// 12 units away, with a noise of 0.15 px. The edges have the true rotations and directions.
 std::vector<Zoom> ZoomsOf(const Filming& filming) {
   std::mt19937 random(3);
-  std::normal_distribution<double> noise_px(0.0, 0.3);
+  std::normal_distribution<double> noise_px(0.0, 0.15);
   std::uniform_real_distribution<double> lateral(-8.0, 8.0);
   std::uniform_real_distribution<double> depth(4.0, 12.0);
   std::vector<Eigen::Vector3d> points;
@@ -70,6 +69,9 @@ std::vector<Zoom> ZoomsOf(const Filming& filming) {
       edge.i = FrameId{before};
       edge.j = FrameId{k};
       edge.j_from_i = cam_from_world[k] * cam_from_world[before].Inverse();
+      const Eigen::Vector3d way =
+          cam_from_world[k] * (filming.center_in_world(before) - filming.center_in_world(k));
+      if (way.norm() > 0.0) edge.translation_direction = way.normalized();
       edge.rotation_only = filming.center_in_world(k) == filming.center_in_world(before) &&
                            filming.factor(k) == filming.factor(before);
       graph.AddEdge(edge);
@@ -106,6 +108,39 @@ TEST(FindZooms, FindsOneThatGoesBack) {
   const std::vector<Zoom> zooms = ZoomsOf({Sideways, 0.01, out});
   ASSERT_EQ(zooms.size(), 1U);
   EXPECT_NEAR(zooms.front().factor, 1.0 / 1.4, 0.03);
+}
+
+// The movement makes points expand while the zoom makes them contract. It is told, with about half
+// of its size; what is left of it in the depths of later points may look like another one.
+TEST(FindZooms, FindsOneThatGoesBackAgainstAMovementAhead) {
+  const auto out = [](int frame) { return 1.4 / ToTwoFifths(frame); };
+  const std::vector<Zoom> zooms = ZoomsOf({Ahead, 0.01, out});
+  const auto largest = std::min_element(
+      zooms.begin(), zooms.end(), [](const Zoom& a, const Zoom& b) { return a.factor < b.factor; });
+  ASSERT_NE(largest, zooms.end());
+  EXPECT_NEAR(largest->first.value, 15, 3);
+  EXPECT_NEAR(largest->last.value, 25, 3);
+  EXPECT_LT(largest->factor, 0.88);  // 0.71 is right
+  EXPECT_GT(largest->factor, 0.65);
+}
+
+// Half a percent from frame to frame.
+TEST(FindZooms, FindsASlowOne) {
+  const auto slow = [](int frame) { return 1.0 + 0.15 * std::clamp((frame - 5) / 30.0, 0.0, 1.0); };
+  const std::vector<Zoom> zooms = ZoomsOf({Sideways, 0.01, slow});
+  ASSERT_EQ(zooms.size(), 1U);
+  EXPECT_NEAR(zooms.front().factor, 1.15, 0.05);
+}
+
+TEST(FindZooms, TellsTwoApart) {
+  const auto twice = [](int frame) {
+    return 1.0 + 0.2 * (std::clamp((frame - 6) / 6.0, 0.0, 1.0) +
+                        std::clamp((frame - 27) / 6.0, 0.0, 1.0));
+  };
+  const std::vector<Zoom> zooms = ZoomsOf({Sideways, 0.01, twice});
+  ASSERT_EQ(zooms.size(), 2U);
+  EXPECT_NEAR(zooms[0].factor, 1.2, 0.03);
+  EXPECT_NEAR(zooms[1].factor, 1.4 / 1.2, 0.03);
 }
 
 TEST(FindZooms, TakesNoMovementForOne) {
