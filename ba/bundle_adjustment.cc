@@ -154,9 +154,12 @@ class Rounds {
     round.initial_radius = options_.fine.initial_radius;
     // Times the least gain: more than a round leaves to be gained that has come to its end.
     constexpr double kClear = 10.0;
-    const LensOptions& lens = options_.lens;
+    LensOptions& lens = options_.lens;
     if (!good_ || !round.enabled) return;
     if (!lens.RefinesAny()) return;
+    const double tangential_share = lens.tangential_share;
+    const bool tries_tangential = lens.min_tangential_gain > 0.0 && !IsTangential(state.camera);
+    if (tries_tangential) lens.tangential_share = 0.0;
     const bool is_at_end = result_.status == BundleStatus::kConverged;
     BundleState without = state;
     const auto minimised = [&](bool refine_lens, BundleState& from) {
@@ -178,7 +181,21 @@ class Rounds {
     refine_lens_ = gain >= lens.min_gain;
     result_.summary.lens_gain = gain;
     result_.summary.lens_refined = refine_lens_;
-    if (!refine_lens_) state = std::move(without);
+    if (!refine_lens_) {
+      state = std::move(without);
+      return;
+    }
+    if (!tries_tangential || !HasTangential(state.camera.model)) return;
+    BundleState centred = state;
+    const double centred_cost = result_.summary.rounds.back().final_cost;
+    lens.tangential_share = tangential_share;
+    Minimise("lens", round, std::chrono::steady_clock::now(), state);
+    if (!good_) return;
+    result_.summary.tangential_gain =
+        std::max(0.0, 1.0 - result_.summary.rounds.back().final_cost / centred_cost);
+    if (result_.summary.tangential_gain >= lens.min_tangential_gain) return;
+    lens.tangential_share = 0.0;
+    state = std::move(centred);
   }
 
   // Of what the state holds now.
@@ -249,7 +266,7 @@ class Rounds {
   }
 
   const Camera& calibrated_;
-  const BundleOptions& options_;
+  BundleOptions options_;  // of its lens what turns out
   BundleResult& result_;
   bool good_ = true;
   bool refine_lens_ = false;

@@ -165,6 +165,7 @@ void FreeLens(const Camera& expected, LensOptions& lens) {
   lens.principal_sigma = 0.03;
   lens.distortion_sigma = 0.1;
   lens.tangential_share = 0.005;
+  lens.min_tangential_gain = 0.05;
   lens.weighs_by_residuals = true;
   lens.expected = expected;
   lens.min_gain = 0.0;

@@ -30,9 +30,7 @@ LensParameters LensOptions::Sigmas(CameraModel model) const {
   if (refine_higher_terms) {
     sigmas.segment(kLensDistortion + num_first, num_coefficients - num_first)
         .setConstant(distortion_sigma);
-    if (model != CameraModel::kEquidistant && model != CameraModel::kFov) {
-      sigmas.segment<2>(kLensDistortion + num_first) *= tangential_share;
-    }
+    if (HasTangential(model)) sigmas.segment<2>(kLensTangential) *= tangential_share;
   }
   return sigmas;
 }
@@ -56,6 +54,9 @@ std::optional<std::string> LensOptions::Problem() const {
     return "given_sigmas has negative ones";
   }
   if (!(min_gain >= 0.0)) return OutOfRange("min_gain", min_gain, "at least 0");
+  if (!(min_tangential_gain >= 0.0)) {
+    return OutOfRange("min_tangential_gain", min_tangential_gain, "at least 0");
+  }
   return std::nullopt;
 }
 

@@ -81,8 +81,9 @@ struct BundleSummary {
   int num_dropped_observations = 0;  // of those given or added, dropped tracks' included
   // Whether keypoints were found less certain along their blurs, and were weighted so.
   bool has_motion_blur = false;
-  double lens_gain = 0.0;     // share of the cost that another lens took off, see LensOptions
-  bool lens_refined = false;  // whether that was enough
+  double lens_gain = 0.0;        // share of the cost that another lens took off, see LensOptions
+  bool lens_refined = false;     // whether that was enough
+  double tangential_gain = 0.0;  // share of the cost that tangential coefficients took off then
   // Of a refined lens, where asked for: the calibration's own counted in. As pose_covariance, they
   // count every observation's error as independent, but for LensOptions::weighs_by_residuals.
   std::optional<LensSigmas> lens_sigmas;

@@ -25,6 +25,15 @@ int NumLensCoefficients(CameraModel model) {
   return std::min(kMost, static_cast<int>(DistortionNames(model).size()));
 }
 
+bool HasTangential(CameraModel model) {
+  return model != CameraModel::kEquidistant && model != CameraModel::kFov;
+}
+
+bool IsTangential(const Camera& camera) {
+  return HasTangential(camera.model) &&
+         !LensOf(camera, camera).segment<2>(kLensTangential).isZero(0.0);
+}
+
 LensParameters LensOf(const Camera& camera, const Camera& reference) {
   LensParameters lens = LensParameters::Zero();
   lens[kLensFocal] = camera.fx / reference.fx;

@@ -24,10 +24,17 @@ inline constexpr int kLensFocal = 0;
 inline constexpr int kLensAspect = 1;
 inline constexpr int kLensCenter = 2;
 inline constexpr int kLensDistortion = 4;
+inline constexpr int kLensTangential = 6;  // two, of models that HasTangential
 
 /// Number of distortion coefficients of a model that LensParameters holds: 5 for a pinhole, which
 /// gets those of kRadtan.
 int NumLensCoefficients(CameraModel model);
+
+/// Whether coefficients of a model are tangential ones: a pinhole gets those of kRadtan.
+bool HasTangential(CameraModel model);
+
+/// Whether such coefficients of the camera are not zero.
+bool IsTangential(const Camera& camera);
 
 /// Throws nothing; parameters that the model does not have are zero.
 LensParameters LensOf(const Camera& camera, const Camera& reference);

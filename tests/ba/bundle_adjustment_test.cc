@@ -585,6 +585,39 @@ TEST(RefineBundle, WeighsWhatIsExpectedOfALensByTheResiduals) {
               1e-9);
 }
 
+// A lens that is off centre by its tangential coefficients has them refined; one that has none, or
+// hardly any, is taken to be centred.
+TEST(RefineBundle, RefinesTangentialCoefficientsWhereTheyGainMuch) {
+  for (const double tangential : {0.0, 5e-5, 2e-3}) {
+    Camera lens = BaCamera(CameraModel::kRadtan);
+    lens.distortion = {0.05, -0.01, tangential, -0.5 * tangential, 0.0};
+    BaScene scene =
+        MakeBaScene({.num_frames = 40, .num_points = 1500, .noise_px = 0.2, .camera = lens});
+    scene.camera = BaCamera();
+    BundleOptions options;
+    options.find_lens_covariance = true;
+    options.lens.refine_principal_point = true;
+    options.lens.refine_higher_terms = true;
+    options.lens.distortion_sigma = 0.1;
+    options.lens.tangential_share = 0.05;
+    options.lens.min_tangential_gain = 0.05;
+    const BundleResult result = RefineBundle(PerturbedProblem(scene, 0.1, 0.5), options);
+    SCOPED_TRACE(tangential);
+    ASSERT_TRUE(result.Usable());
+    ASSERT_TRUE(result.summary.lens_refined) << result.summary.lens_gain;
+    ASSERT_TRUE(result.summary.lens_sigmas);
+    EXPECT_NEAR(result.camera.distortion[0], 0.05, 5e-3);
+    if (tangential > 1e-3) {
+      EXPECT_NEAR(result.camera.distortion[2], tangential, 0.2 * tangential);
+      EXPECT_GT(result.summary.lens_sigmas->distortion[2], 0.0);
+    } else {
+      EXPECT_EQ(result.camera.distortion[2], 0.0) << result.summary.tangential_gain;
+      EXPECT_EQ(result.camera.distortion[3], 0.0);
+      EXPECT_EQ(result.summary.lens_sigmas->distortion[2], 0.0);
+    }
+  }
+}
+
 TEST(RefineBundle, LeavesAGoodCalibrationToTheLastBit) {
   for (const std::uint32_t seed : {1U, 2U, 3U}) {
     const BaScene scene = MakeBaScene({.noise_px = 0.5, .seed = seed});

@@ -121,6 +121,7 @@ void AddLens(const BundleSummary& bundle, const MapResult& positions, SummaryTab
   table.insert(table.end(),
                {{"lens.gain", bundle.lens_gain},
                 {"lens.refined", bundle.lens_refined},
+                {"lens.tangential_gain", bundle.tangential_gain},
                 {"lens.model", Name(camera.model)},
                 {"lens.fx", camera.fx},
                 {"lens.fy", camera.fy},

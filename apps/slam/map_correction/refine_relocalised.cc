@@ -123,6 +123,7 @@ std::set<FrameId> RefineRelocalised(const std::vector<RelocalisedMap>& maps,
     } else {
       bundle.summary.lens_gain = before.lens_gain;
       bundle.summary.lens_refined = before.lens_refined;
+      bundle.summary.tangential_gain = before.tangential_gain;
       bundle.summary.lens_sigmas = before.lens_sigmas;
       bundle.summary.lens_covariance = before.lens_covariance;
     }
