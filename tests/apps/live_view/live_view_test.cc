@@ -208,7 +208,7 @@ TEST(ViewState, ThinsOutAVeryLargeMap) {
   map.revision = 1;
   for (int k = 0; k < 250'000; ++k) map.points.push_back({TrackId{k}, {1.0 * k, 0.0, 1.0}, {}});
   ShownMap shown;
-  shown.Update(map, 0.0);
+  shown.Update(map);
   EXPECT_LE(shown.num_points(), ShownMap::kMaxPoints);
   EXPECT_GT(shown.num_points(), ShownMap::kMaxPoints / 2);
 }
