@@ -2,7 +2,10 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <optional>
+#include <utility>
+#include <vector>
 
 #include "apps/slam/build_map.h"
 #include "apps/slam/orientation_collector.h"
@@ -19,6 +22,9 @@ constexpr int kMaxFrames = 600;
 // by as much are within what bundle adjustment corrects.
 constexpr double kTolerance = 0.02;
 constexpr int kMaxRounds = 3;
+
+// A fisheye must leave residuals of so much of those of a pinhole.
+constexpr double kClearlyLess = 0.9;
 
 // Features of a frame: a lens has a dozen parameters and needs fewer than a map.
 constexpr int kMaxFeatures = 700;
@@ -104,8 +110,8 @@ SlamOptions OptionsOfRounds(SlamOptions options, LensPurpose purpose) {
   return options;
 }
 
-// The lens that the pairs of views tell; nullopt: none.
-std::optional<Camera> LensOfPairs(const Orientations& orientations,
+// The lens that the pairs of views tell, if any; behind a fisheye the pinhole that it may be.
+std::vector<Camera> LensesOfPairs(const Orientations& orientations,
                                   const LensGuess& guess,
                                   const SlamOptions& options) {
   const Camera& camera = guess.camera;
@@ -116,8 +122,10 @@ std::optional<Camera> LensOfPairs(const Orientations& orientations,
                               {camera.width, camera.height},
                               guess.knows_focal ? std::optional(camera.MeanFocal()) : std::nullopt,
                               fit_options);
-  if (!found) return std::nullopt;
-  return found->fit.camera;
+  std::vector<Camera> lenses;
+  if (found) lenses.push_back(found->fit.camera);
+  if (found && found->pinhole) lenses.push_back(*found->pinhole);
+  return lenses;
 }
 
 // Orientations as they are through another lens.
@@ -129,6 +137,16 @@ Orientations SeenThrough(const Camera& camera,
       ThroughLens(orientations, camera, options.rotodom, options.seed, options.num_threads);
   seen.camera = camera;
   return seen;
+}
+
+// Median residual of the largest component, px; infinite where there is no map.
+double ResidualOf(const MapResult& map) {
+  const auto largest = std::max_element(
+      map.bundles.begin(), map.bundles.end(), [](const BundleSummary& a, const BundleSummary& b) {
+        return a.num_observations < b.num_observations;
+      });
+  return largest == map.bundles.end() ? std::numeric_limits<double>::infinity()
+                                      : largest->after.median_px;
 }
 
 }  // namespace
@@ -197,19 +215,31 @@ LensEstimate EstimateLens(FrameSource& frames,
   estimate.interrupted = tracked.interrupted && frames_observer.is_asked();
   if (estimate.interrupted || tracked.CameraStands()) return estimate;
   estimate.static_content = tracked.static_content;
-  if (const auto by_pairs = LensOfPairs(tracked, guess, options)) {
-    estimate.camera = *by_pairs;
+  int round = 0;
+  const auto adjusted_from = [&](const Camera& camera) {
+    observer.OnLensRound(++round, camera);
+    FreeLens(PlainLens(camera), options_of_rounds.ba.lens);
+    return BuildKeyframeMap(SeenThrough(camera, tracked, options),
+                            options_of_rounds,
+                            observer,
+                            purpose == LensPurpose::kStart ? kObservationsToStart : 0);
+  };
+  const std::vector<Camera> by_pairs = LensesOfPairs(tracked, guess, options);
+  if (!by_pairs.empty()) {
+    estimate.camera = by_pairs.front();
     estimate.is_found = true;
   }
-  for (int round = 1; round <= kMaxRounds; ++round) {
-    const double before_px = estimate.camera.MeanFocal();
-    observer.OnLensRound(round, estimate.camera);
-    FreeLens(PlainLens(estimate.camera), options_of_rounds.ba.lens);
-    const MapResult map =
-        BuildKeyframeMap(SeenThrough(estimate.camera, tracked, options),
-                         options_of_rounds,
-                         observer,
-                         purpose == LensPurpose::kStart ? kObservationsToStart : 0);
+  while (round < kMaxRounds) {
+    double before_px = estimate.camera.MeanFocal();
+    MapResult map = adjusted_from(estimate.camera);
+    if (round == 1 && by_pairs.size() > 1) {
+      MapResult pinhole = adjusted_from(by_pairs.back());
+      if (std::isfinite(ResidualOf(pinhole)) &&
+          !(ResidualOf(map) < kClearlyLess * ResidualOf(pinhole))) {
+        before_px = by_pairs.back().MeanFocal();
+        map = std::move(pinhole);
+      }
+    }
     if (map.camera == estimate.camera || map.camera.Problem()) break;
     estimate.camera = map.camera;
     estimate.sigmas = map.lens_sigmas;

@@ -9,6 +9,7 @@
 #include <gtest/gtest.h>
 
 #include "output/tables/loops_csv.h"
+#include "rotodom/camera/read_camera.h"
 #include "tests/apps/run_directory.h"
 
 namespace rotslam {
@@ -110,6 +111,38 @@ TEST(StreetWithAStop, IsHeldAmidATurn) {
   }
   EXPECT_NE(held.at(30).center_in_world, held.at(40).center_in_world);
   EXPECT_NE(held.at(70).center_in_world, held.at(60).center_in_world);
+}
+
+// Pairs of views of a street fit a fisheye as well.
+TEST(StreetWithoutACalibration, IsSeenThroughAPinhole) {
+  const TemporaryFolder folder;
+  const fs::path lens = folder.path() / "lens.yaml";
+  Camera truth;
+  truth.model = CameraModel::kRadtan;
+  truth.width = 640;
+  truth.height = 480;
+  truth.fx = truth.fy = 320.0;
+  truth.cx = 338.0;
+  truth.cy = 229.0;
+  truth.distortion = {-0.25, 0.05};
+  WriteCameraYaml(lens, truth);
+  const fs::path sequence = folder.path() / "street";
+  const CommandResult simulated = Rotslam({"simulate",
+                                           "street",
+                                           "--frames=150",
+                                           "--seed=1",
+                                           "--camera=" + lens.string(),
+                                           "--out=" + sequence.string()});
+  ASSERT_EQ(simulated.exit_code, 0) << simulated.error;
+  const fs::path out = folder.path() / "out";
+  const CommandResult run =
+      Rotslam({"run", sequence.string(), "--camera=none", "--no-report", "--out=" + out.string()});
+  ASSERT_EQ(run.exit_code, 0) << run.error;
+  const Camera found = ReadCamera(out / "camera.yaml");
+  EXPECT_EQ(found.model, CameraModel::kRadtan);
+  EXPECT_NEAR(found.fx / truth.fx, 1.0, 0.003);
+  EXPECT_NEAR(found.cx, truth.cx, 0.003 * truth.width);
+  EXPECT_NEAR(found.cy, truth.cy, 0.003 * truth.width);
 }
 
 }  // namespace
