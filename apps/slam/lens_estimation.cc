@@ -5,7 +5,6 @@
 #include <limits>
 #include <optional>
 #include <utility>
-#include <vector>
 
 #include "apps/slam/build_map.h"
 #include "apps/slam/orientation_collector.h"
@@ -110,8 +109,8 @@ SlamOptions OptionsOfRounds(SlamOptions options, LensPurpose purpose) {
   return options;
 }
 
-// The lens that the pairs of views tell, if any; behind a fisheye the pinhole that it may be.
-std::vector<Camera> LensesOfPairs(const Orientations& orientations,
+// The lens that the pairs of views tell; nullopt: none.
+std::optional<Camera> LensOfPairs(const Orientations& orientations,
                                   const LensGuess& guess,
                                   const SlamOptions& options) {
   const Camera& camera = guess.camera;
@@ -122,10 +121,46 @@ std::vector<Camera> LensesOfPairs(const Orientations& orientations,
                               {camera.width, camera.height},
                               guess.knows_focal ? std::optional(camera.MeanFocal()) : std::nullopt,
                               fit_options);
-  std::vector<Camera> lenses;
-  if (found) lenses.push_back(found->fit.camera);
-  if (found && found->pinhole) lenses.push_back(*found->pinhole);
-  return lenses;
+  if (!found) return std::nullopt;
+  return found->fit.camera;
+}
+
+// The pinhole with radial distortion that shows nearly what a fisheye does; nullopt where the view
+// is too wide for a pinhole, or where the lens is none.
+std::optional<Camera> PinholeLike(const Camera& fisheye) {
+  if (fisheye.model != CameraModel::kEquidistant) return std::nullopt;
+  // Farther from the axis distances in the picture grow without end.
+  const double max_tangent = std::tan(70.0 * kRadFromDeg);
+  constexpr int kSamples = 40;
+  constexpr int kLeastSamples = 30;  // that a pinhole can show
+  const Eigen::Vector2d center(fisheye.cx, fisheye.cy);
+  const Eigen::Vector2d to_corner(
+      fisheye.cx > 0.5 * fisheye.width ? -fisheye.cx : fisheye.width - fisheye.cx,
+      fisheye.cy > 0.5 * fisheye.height ? -fisheye.cy : fisheye.height - fisheye.cy);
+  // radius = f t + f k1 t^3 + f k2 t^5 of the tangent t.
+  Eigen::Matrix<double, kSamples, 3> A = Eigen::Matrix<double, kSamples, 3>::Zero();
+  Eigen::Matrix<double, kSamples, 1> radii = Eigen::Matrix<double, kSamples, 1>::Zero();
+  for (int n = 0; n < kSamples; ++n) {
+    const Eigen::Vector2d offset = (n + 1.0) / kSamples * to_corner;
+    const auto bearing = fisheye.Unproject(center + offset);
+    const bool is_ahead = bearing && bearing->z() > 0.0;
+    const double t = is_ahead ? bearing->head<2>().norm() / bearing->z() : 2.0 * max_tangent;
+    if (t > max_tangent) {
+      if (n < kLeastSamples) return std::nullopt;
+      break;
+    }
+    A.row(n) << t, t * t * t, t * t * t * t * t;
+    radii[n] = offset.norm();
+  }
+  const Eigen::Vector3d terms = (A.transpose() * A).ldlt().solve(A.transpose() * radii);
+  Camera pinhole = UncalibratedCamera({fisheye.width, fisheye.height}, terms[0]);
+  pinhole.model = CameraModel::kRadtan;
+  pinhole.cx = fisheye.cx;
+  pinhole.cy = fisheye.cy;
+  pinhole.distortion[0] = terms[1] / terms[0];
+  pinhole.distortion[1] = terms[2] / terms[0];
+  if (pinhole.Problem()) return std::nullopt;
+  return pinhole;
 }
 
 // Orientations as they are through another lens.
@@ -183,7 +218,7 @@ void FreeLens(const Camera& expected, LensOptions& lens) {
   lens.principal_sigma = 0.03;
   lens.distortion_sigma = 0.1;
   lens.tangential_share = 0.005;
-  lens.min_tangential_gain = 0.05;
+  lens.min_tangential_gain = 0.002;
   lens.weighs_by_residuals = true;
   lens.expected = expected;
   lens.min_gain = 0.0;
@@ -224,20 +259,20 @@ LensEstimate EstimateLens(FrameSource& frames,
                             observer,
                             purpose == LensPurpose::kStart ? kObservationsToStart : 0);
   };
-  const std::vector<Camera> by_pairs = LensesOfPairs(tracked, guess, options);
-  if (!by_pairs.empty()) {
-    estimate.camera = by_pairs.front();
+  if (const auto by_pairs = LensOfPairs(tracked, guess, options)) {
+    estimate.camera = *by_pairs;
     estimate.is_found = true;
   }
+  const std::optional<Camera> pinhole = PinholeLike(estimate.camera);
   while (round < kMaxRounds) {
     double before_px = estimate.camera.MeanFocal();
     MapResult map = adjusted_from(estimate.camera);
-    if (round == 1 && by_pairs.size() > 1) {
-      MapResult pinhole = adjusted_from(by_pairs.back());
-      if (std::isfinite(ResidualOf(pinhole)) &&
-          !(ResidualOf(map) < kClearlyLess * ResidualOf(pinhole))) {
-        before_px = by_pairs.back().MeanFocal();
-        map = std::move(pinhole);
+    if (round == 1 && pinhole) {
+      MapResult through_pinhole = adjusted_from(*pinhole);
+      if (std::isfinite(ResidualOf(through_pinhole)) &&
+          !(ResidualOf(map) < kClearlyLess * ResidualOf(through_pinhole))) {
+        before_px = pinhole->MeanFocal();
+        map = std::move(through_pinhole);
       }
     }
     if (map.camera == estimate.camera || map.camera.Problem()) break;

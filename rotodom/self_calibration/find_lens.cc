@@ -215,7 +215,6 @@ std::optional<FoundLens> FindLens(std::span<const LensPair> pairs,
   const auto fit = FitLensToPairs(pairs, prior, start, options);
   if (!fit || fit->camera.Problem()) return std::nullopt;
   found.fit = *fit;
-  if (best == 1 && fits[0]) found.pinhole = fits[0]->camera;
   return found;
 }
 

@@ -31,9 +31,6 @@ LensPrior UnknownLens(CameraModel model,
 /// A lens that the images have told.
 struct FoundLens {
   FittedLens fit;
-  // Of a fisheye: the best pinhole, if it is not hopeless. Bundle adjustment tells better which of
-  // the two it is.
-  std::optional<Camera> pinhole;
   // Costs of the best lens of either projection, on points that were left out of the fits; 1: none.
   double cost_of_pinhole = 1.0;
   double cost_of_fisheye = 1.0;

@@ -600,7 +600,7 @@ TEST(RefineBundle, RefinesTangentialCoefficientsWhereTheyGainMuch) {
     options.lens.refine_higher_terms = true;
     options.lens.distortion_sigma = 0.1;
     options.lens.tangential_share = 0.05;
-    options.lens.min_tangential_gain = 0.05;
+    options.lens.min_tangential_gain = 0.002;
     const BundleResult result = RefineBundle(PerturbedProblem(scene, 0.1, 0.5), options);
     SCOPED_TRACE(tangential);
     ASSERT_TRUE(result.Usable());
