@@ -84,7 +84,7 @@ int NumViews(const std::vector<RelativeRotation>& edges) {
   return num_views;
 }
 
-// The keyword arguments of rotslam.average_rotations.
+// Eight parameters: the keyword arguments of rotslam.average_rotations.
 py::dict Average(const py::object& i,
                  const py::object& j,
                  const py::object& j_from_i,

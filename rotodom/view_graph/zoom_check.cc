@@ -250,6 +250,7 @@ int GapOf(const RelativeRotation& edge) { return edge.j.value - edge.i.value; }
 
 // @param edge       to frame k from the one before it.
 // @param log_focal  of the frame before k.
+// Six parameters: three views as two callers know them, the camera and the options.
 LogRatio ByAnchor(const Anchor& anchor,
                   const Features& k,
                   const RelativeRotation& edge,
@@ -325,7 +326,8 @@ double ExpansionOf(const std::vector<PointPair>& pairs, const Rotation& k_from_j
 }
 
 // Of a camera that only rotates, or comes nearer to a wall: once the expansion is taken out,
-// rotation explains the points.
+// rotation explains the points. Six parameters: two views with their edge, the camera and the
+// options.
 LogRatio ByExpansion(const Features& view_j,
                      const Features& view_k,
                      double log_focal,
