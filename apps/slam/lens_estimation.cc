@@ -269,7 +269,7 @@ LensEstimate EstimateLens(FrameSource& frames,
     MapResult map = adjusted_from(estimate.camera);
     if (round == 1 && pinhole) {
       MapResult through_pinhole = adjusted_from(*pinhole);
-      if (std::isfinite(ResidualOf(through_pinhole)) &&
+      if (std::isfinite(ResidualOf(through_pinhole)) && !through_pinhole.camera.Problem() &&
           !(ResidualOf(map) < kClearlyLess * ResidualOf(through_pinhole))) {
         before_px = pinhole->MeanFocal();
         map = std::move(through_pinhole);

@@ -30,8 +30,9 @@ struct Zoom {
 /// @param camera    of all frames, as calibrated.
 /// @param features  of the frames, with tracks.
 /// Error:   2 % of a ratio of 1.4 for a camera that moves sideways or turns, 9 % for one that moves
-///          ahead, half of it where the lens goes back meanwhile; 0.15 px, f = 500 (rotodom tests).
-///          Real footage: docs/footage.md. A zoom slower than 0.5 % a frame may not be found.
+///          ahead (0.3 px, f = 500); half of the ratio where the lens goes back meanwhile (0.15 px;
+///          not told at 0.3 px; rotodom tests). Real footage: docs/footage.md. A zoom slower than
+///          0.5 % a frame may not be found.
 /// Cost:    0.3 to 0.6 ms for every third frame; 1 ms more where it zooms.
 std::vector<Zoom> FindZooms(const Camera& camera,
                             const std::map<FrameId, Features>& features,

@@ -8,9 +8,9 @@
 
 namespace rotslam {
 
-/// Makes the folder for a run's results and proves that it can be written, before hours of work.
-/// Makes the folder of a run and publishes the files that a killed run was publishing there. Throws
-/// std::runtime_error with path and reason.
+/// Makes the folder for a run's results, proves that it can be written, before hours of work, and
+/// publishes the files that a killed run was publishing there. Throws std::runtime_error with path
+/// and reason.
 std::filesystem::path PrepareRunDirectory(const std::string& out);
 
 /// The message for a run that Ctrl-C has ended: it names the files that WriteOrientations has left.
