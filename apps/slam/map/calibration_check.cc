@@ -18,8 +18,8 @@ constexpr int kLeastFrames = 5;
 
 bool CalibrationCheck::Contradicts() const {
   // Good calibrations of real cameras are up to 1.6 % from what the images say of them.
-  constexpr double kLeast = 0.025;
-  constexpr double kSigmas = 5.0;
+  constexpr double kLeast = 0.02;
+  constexpr double kSigmas = 2.5;
   const double error = std::abs(share - 1.0);
   return is_known && error > std::max(kLeast, kSigmas * sigma);
 }
@@ -30,8 +30,8 @@ CalibrationCheck CheckCalibration(const Reconstruction& map,
                                   const BundleOptions& options) {
   // A focal length that is found farther off than this is sought again from there, with the
   // observations that fit by then.
-  constexpr double kDoubtful = 0.012;
-  constexpr int kMaxPasses = 3;
+  constexpr double kDoubtful = 0.006;
+  constexpr int kMaxPasses = 6;
   CalibrationCheck check;
   if (map.center_in_world.size() < kLeastFrames) return check;
   BundleOptions freed = options;
@@ -46,6 +46,7 @@ CalibrationCheck CheckCalibration(const Reconstruction& map,
   freed.lens.refine_focal = true;
   freed.lens.focal_sigma = 0.5;
   freed.lens.min_gain = 0.0;
+  freed.lens.weighs_by_residuals = true;
   // Where all that was tracked leaves something open, what fits the map does not.
   for (const std::vector<Track>* seen : {&tracks, &map.tracks}) {
     BundleProblem problem;
