@@ -20,8 +20,12 @@ bool CalibrationCheck::Contradicts() const {
   // Good calibrations of real cameras are up to 1.6 % from what the images say of them.
   constexpr double kLeast = 0.02;
   constexpr double kSigmas = 2.5;
+  // A camera that moves too little to tell the focal length better than this is wrong about it by
+  // more than its deviation: up to 3.3 of them in 120 frames of a room.
+  constexpr double kTold = 0.015;
+  constexpr double kSigmasInDoubt = 5.0;
   const double error = std::abs(share - 1.0);
-  return is_known && error > std::max(kLeast, kSigmas * sigma);
+  return is_known && error > std::max(kLeast, (sigma < kTold ? kSigmas : kSigmasInDoubt) * sigma);
 }
 
 CalibrationCheck CheckCalibration(const Reconstruction& map,
