@@ -45,6 +45,14 @@ int RefuseCommandLine(const CLI::App& app, const CLI::ParseError& error, int arg
   return 2;
 }
 
+// The same heading with every version of CLI11.
+void NameGroups(CLI::App& app) {
+  for (CLI::App* command : app.get_subcommands({})) {
+    command->group("Commands");
+    NameGroups(*command);
+  }
+}
+
 }  // namespace
 }  // namespace rotslam
 
@@ -80,6 +88,7 @@ int main(int argc, char** argv) {
     rotslam::AddCalibrateCommand(app, action);
     rotslam::AddCompletionCommand(app, action);
     rotslam::AddManCommand(app, action);
+    rotslam::NameGroups(app);
     app.set_version_flag("--version", rotslam::VersionText(), "Print versions and end");
     try {
       app.parse(argc, argv);

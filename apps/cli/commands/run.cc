@@ -28,6 +28,7 @@ struct RunFlags {
   KrotFlags krot;
   bool ascii = false;
   bool use_report = true;
+  bool prints_config = false;
 };
 
 RunOptions RunOptionsOf(const RunFlags& flags) {
@@ -209,16 +210,23 @@ int Run(const RunFlags& flags) {
   return FinishRun(tracked, {flags.ascii, flags.use_report, flags.track.common});
 }
 
-// Prints the options as they would be used, and ends the program.
-void AddPrintConfigFlag(CLI::App& command, const RunFlags& flags) {
-  command.add_flag_callback(
-      "--print-config",
-      [&flags] {
-        RunOptions options = RunOptionsOf(flags);
-        std::fputs(OptionsAsYaml(ListOptions(options)).c_str(), stdout);
-        throw CLI::Success();
-      },
-      "Print all options as YAML for --config, with values, units and explanations, and end");
+int PrintConfig(const RunFlags& flags) {
+  RunOptions options = RunOptionsOf(flags);
+  std::fputs(OptionsAsYaml(ListOptions(options)).c_str(), stdout);
+  return 0;
+}
+
+// A flag that needs neither a sequence nor a folder for results.
+void AddPrintConfigFlag(CLI::App& command, RunFlags& flags) {
+  command
+      .add_flag_callback(
+          "--print-config",
+          [&command, &flags] {
+            flags.prints_config = true;
+            for (CLI::Option* option : command.get_options()) option->required(false);
+          },
+          "Print all options as YAML for --config, with values, units and explanations, and end")
+      ->trigger_on_parse();
 }
 
 }  // namespace
@@ -244,10 +252,11 @@ void AddRunCommand(CLI::App& app, Action& action) {
   command->add_flag("--ascii", flags->ascii, "Write the PLY files as text");
   AddReportFlag(*command, flags->use_report);
   AddCommonFlags(*command, flags->track.common);
-  // The last one: what stands in front of it is read first.
   AddPrintConfigFlag(*command, *flags);
   command->footer("Example: rotslam run kitti/sequences/00 --out runs/kitti00");
-  command->callback([flags, &action] { action = [flags] { return Run(*flags); }; });
+  command->callback([flags, &action] {
+    action = [flags] { return flags->prints_config ? PrintConfig(*flags) : Run(*flags); };
+  });
 }
 
 }  // namespace rotslam

@@ -29,7 +29,7 @@ bool IsInstalled(const std::string& program) {
   return std::system(("command -v " + program + " >/dev/null 2>&1").c_str()) == 0;
 }
 
-// The names below "Subcommands:" in a help text.
+// The names below "Commands:" in a help text.
 std::vector<std::string> CommandsIn(const std::string& help) {
   std::vector<std::string> names;
   bool is_below = false;
@@ -37,7 +37,7 @@ std::vector<std::string> CommandsIn(const std::string& help) {
     if (is_below && line.starts_with("  ") && line[2] != ' ') {
       names.push_back(line.substr(2, line.find(' ', 2) - 2));
     }
-    is_below = is_below || line == "Subcommands:";
+    is_below = is_below || line == "Commands:";
   }
   return names;
 }
