@@ -1,8 +1,10 @@
 #include <algorithm>
+#include <limits>
 #include <map>
 #include <optional>
 #include <stdexcept>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include <pybind11/stl.h>
@@ -13,6 +15,8 @@
 #include "apps/python/problem.h"
 #include "rotodom/averaging/certificate.h"
 #include "rotodom/averaging/global_averaging.h"
+#include "rotodom/averaging/support/orientation_deviations.h"
+#include "rotodom/averaging/support/view_support.h"
 #include "rotodom/sensor_orientations/sensor_orientations.h"
 
 namespace py = pybind11;
@@ -84,6 +88,35 @@ int NumViews(const std::vector<RelativeRotation>& edges) {
   return num_views;
 }
 
+// How well the inliers hold each view: `support` [n] and `covariance` [n, 3, 3].
+std::pair<py::array_t<int>, DoubleArray> JudgeViews(std::vector<RelativeRotation> edges,
+                                                    const GlobalAveragingOptions& options,
+                                                    const GlobalAveragingResult& result,
+                                                    int num_views) {
+  std::vector<char> is_inlier(edges.size(), 0);
+  std::vector<double> weights(edges.size(), 0.0);
+  for (std::size_t k = 0; k < edges.size(); ++k) {
+    edges[k].covariance = ErrorCovariance(edges[k], options);
+    is_inlier[k] = result.sigmas[k] <= options.loss_sigmas ? 1 : 0;
+    weights[k] = is_inlier[k];
+  }
+  std::vector<int> support(static_cast<std::size_t>(num_views), 0);
+  for (const auto& [view, number] : SupportOfViews(edges, is_inlier, {})) {
+    support[static_cast<std::size_t>(view.value)] = number;
+  }
+  DoubleArray covariance({num_views, 3, 3});
+  std::fill_n(
+      covariance.mutable_data(), covariance.size(), std::numeric_limits<double>::quiet_NaN());
+  auto at = covariance.mutable_unchecked<3>();
+  for (const auto& [view, matrix] :
+       DeviationsOfViews(edges, weights, result.cam_from_world, {}).covariance) {
+    for (int a = 0; a < 3; ++a) {
+      for (int b = 0; b < 3; ++b) at(view.value, a, b) = matrix(a, b);
+    }
+  }
+  return {ListOf(support), covariance};
+}
+
 // Eight parameters: the keyword arguments of rotslam.average_rotations.
 py::dict Average(const py::object& i,
                  const py::object& j,
@@ -114,8 +147,11 @@ py::dict Average(const py::object& i,
   for (const auto& [view, number] : result.component) {
     component[static_cast<std::size_t>(view.value)] = number;
   }
+  const auto [support, deviations] = JudgeViews(edges, options, result, num_views);
   return py::dict("cam_from_world"_a = MatricesOf(result.cam_from_world, num_views),
                   "component"_a = ListOf(component),
+                  "support"_a = support,
+                  "covariance"_a = deviations,
                   "angle_rad"_a = ListOf(result.angle_rad),
                   "sigmas"_a = ListOf(result.sigmas),
                   "cost"_a = result.cost,
@@ -243,6 +279,9 @@ options:    dict, for example {"loss_sigmas": 6.0}: edge_floor_deg, error_factor
 Returns a dict:
   cam_from_world   [n, 3, 3], world->camera; NaN for numbers that no edge names
   component        [n], pieces that no edge connects; -1 for those
+  support          [n], inliers that hold a view; 1: its orientation hangs on one edge
+  covariance       [n, 3, 3], rad^2, of the error delta in Exp(delta) cam_from_world, against the
+                   mean of the component's views; NaN where no inlier holds a view
   angle_rad        [m], between measured and averaged
   sigmas           [m], the same in standard deviations, a norm over three axes
   cost, num_inliers, iterations, has_converged

@@ -43,6 +43,13 @@ int SmallId(const fs::path& file, const char* what, std::uint64_t id) {
   return static_cast<int>(id);
 }
 
+// Pixels per radian where a camera shows a bearing, the geometric mean over all directions.
+double PixelsPerRadian(const Camera& camera, const Eigen::Vector3d& bearing) {
+  Eigen::Matrix<double, 2, 3> J;
+  if (!camera.Project(bearing, &J)) return camera.MeanFocal();
+  return std::sqrt(std::sqrt((J * J.transpose()).determinant()));
+}
+
 // The parts of a model, however they were written.
 class ModelBuilder {
  public:
@@ -84,10 +91,15 @@ class ModelBuilder {
     }
     std::vector<double> focals_px;
     for (const auto& [frame, image] : model_.images) {
-      focals_px.push_back(model_.cameras.at(image.camera).MeanFocal());
+      const Camera& camera = model_.cameras.at(image.camera);
+      focals_px.push_back(camera.MeanFocal());
+      if (camera.model == CameraModel::kEquidistant || camera.model == CameraModel::kFov) {
+        model_.camera.model = CameraModel::kEquidistant;
+      }
     }
     model_.camera.fx = model_.camera.fy = Median(std::move(focals_px));
     is_common_ = true;
+    ChooseSize();
   }
 
   void AddPoint(const fs::path& file, const PointTrack& point) {
@@ -118,7 +130,7 @@ class ModelBuilder {
         const auto moved_px = model_.camera.Project(*bearing);
         if (!moved_px) continue;
         keypoint_px = *moved_px;
-        sigma_px = model_.camera.fx / camera.MeanFocal();
+        sigma_px = PixelsPerRadian(model_.camera, *bearing) / PixelsPerRadian(camera, *bearing);
       }
       if (!keypoint_of.try_emplace(frame, static_cast<int>(index)).second) {
         ++model_.num_doubled;
@@ -153,6 +165,19 @@ class ModelBuilder {
   ColmapModel Take() { return std::move(model_); }
 
  private:
+  // Makes the common camera as large as the largest of its images, seen at its focal length.
+  void ChooseSize() {
+    Camera& common = model_.camera;
+    for (const auto& [frame, image] : model_.images) {
+      const Camera& camera = model_.cameras.at(image.camera);
+      const double scale = common.fx / camera.MeanFocal();
+      common.width = std::max(common.width, static_cast<int>(std::ceil(scale * camera.width)));
+      common.height = std::max(common.height, static_cast<int>(std::ceil(scale * camera.height)));
+    }
+    common.cx = 0.5 * (common.width - 1);
+    common.cy = 0.5 * (common.height - 1);
+  }
+
   ColmapModel model_;
   bool is_common_ = false;  // keypoints are moved to a camera of all
   std::set<std::uint64_t> points_;

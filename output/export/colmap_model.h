@@ -20,8 +20,9 @@ struct ColmapImage {
 
 /// A COLMAP model as ours: image ids are frames, point ids tracks numbered anew in their order.
 struct ColmapModel {
-  // The camera of all images. Where they have several, a pinhole of the median focal length with
-  // the principal point at zero: the tracks' keypoints are moved to it, through their own lenses.
+  // The camera of all images. Where they have several, one without distortion of the median focal
+  // length: a pinhole, or equidistant where one of them is a fisheye. The tracks' keypoints are
+  // moved to it, through their own lenses, with what a pixel of their image is there as deviation.
   Camera camera;
   Reconstruction reconstruction;
   std::map<FrameId, std::string> image_name;

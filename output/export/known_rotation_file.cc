@@ -390,9 +390,10 @@ KnownRotationInput FromColmap(std::shared_ptr<const ColmapModel> model) {
                           std::to_string(model->num_doubled) + " times: the first one is kept");
   }
   if (model->HasSeveralCameras()) {
-    input.notes.push_back("the images have " + std::to_string(model->cameras.size()) +
-                          " cameras: they are solved as one pinhole, through their own lenses, "
-                          "which stay as they are");
+    input.notes.push_back(
+        "the images have " + std::to_string(model->cameras.size()) +
+        " cameras: they are solved as one without distortion, through their own lenses, "
+        "which stay as they are");
   }
   input.colmap = std::move(model);
   return input;

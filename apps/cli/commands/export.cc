@@ -17,6 +17,7 @@
 #include "apps/cli/export/undistort.h"
 #include "apps/cli/run_directory/run_masks.h"
 #include "apps/cli/terminal/progress.h"
+#include "output/export/colmap_model.h"
 #include "output/map/map_keypoints.h"
 #include "output/map/run_map.h"
 #include "output/map/view_graph_matches.h"
@@ -277,6 +278,18 @@ void WarnOfMissingImages(const RunMap& map, Progress& progress) {
   }
 }
 
+// What `solve` made of a COLMAP model of several cameras has a common one without distortion in its
+// map, which shows none of the images.
+void RefuseSeveralCameras(const ExportFlags& flags) {
+  const fs::path sparse = fs::path(flags.run) / "sparse";
+  const fs::path model = sparse / "0";
+  if (!fs::exists(model / "images.bin") && !fs::exists(model / "images.txt")) return;
+  if (!ReadColmapModel(model).HasSeveralCameras()) return;
+  throw std::runtime_error(flags.run + ": its images have several cameras, of which --to " +
+                           flags.format + " has one only; " + sparse.string() +
+                           " is its COLMAP model with every camera's own lens");
+}
+
 // Formats that need no more than orientations, of a run that has no more.
 int ExportOrientations(const ExportFlags& flags, const Format& format, Progress& progress) {
   if (format.frames != FrameChoice::kAll || format.has_points || flags.keyframes) {
@@ -306,6 +319,8 @@ int Export(const ExportFlags& flags) {
   const Format& format = Formats().at(flags.format);
   RefuseContradictions(flags);
   if (HasOrientationsOnly(flags.run)) return ExportOrientations(flags, format, progress);
+  const bool refers_to_images = format.frames != FrameChoice::kAll;
+  if (refers_to_images || flags.undistort) RefuseSeveralCameras(flags);
   ExportJob job;
   const FrameChoice frames = flags.all_frames  ? FrameChoice::kAll
                              : flags.keyframes ? FrameChoice::kKeyframes
@@ -330,7 +345,6 @@ int Export(const ExportFlags& flags) {
   }
   job.image_folder = undistorts ? Undistort(flags, whole, progress, job.map, matches)
                                 : FindImages(flags, whole, progress, job.map);
-  const bool refers_to_images = format.frames != FrameChoice::kAll;
   if (refers_to_images && !undistorts && flags.images.empty() && flags.extract.empty()) {
     WarnOfMissingImages(job.map, progress);
   }

@@ -216,7 +216,7 @@ int Solve(const SolveFlags& flags) {
   Progress progress(flags.common);
   RunOptions options = OptionsOf(flags);
   KnownRotationInput input = ReadInput(flags, progress);
-  // Several cameras are solved as one pinhole, which has no lens to refine.
+  // Several cameras are solved as one without distortion, which has no lens to refine.
   if (input.colmap != nullptr && input.colmap->HasSeveralCameras()) {
     options.ba = WithFixedLens(options.ba);
   }

@@ -1,6 +1,7 @@
 #include "apps/slam/input/given_rotations.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <functional>
 #include <limits>
@@ -24,6 +25,9 @@ constexpr double kMaxGapS = 0.2;
 // Smallest disagreement at which another convention is considered, deg. Below it noise would
 // decide.
 constexpr double kMinDisagreementDeg = 0.5;
+// The same with offset and mounting taken out, which are fitted, too: a mounting by half a turn
+// explains much of an inversion where the rotation is about one axis.
+constexpr double kMinAlignedDisagreementDeg = 0.1;
 // Another convention must fit this many times better to be reported.
 constexpr double kClearlyBetter = 5.0;
 // Edges needed to tell conventions apart.
@@ -67,6 +71,18 @@ Rotation WithWFirst(const Rotation& cam_from_world) {
   return Rotation(Eigen::Quaterniond(wrong[0], wrong[1], wrong[2], wrong[3])).Inverse();
 }
 
+// Another way to read an orientation, and how messages name it.
+struct Reading {
+  const char* name;
+  Rotation (*read)(const Rotation& cam_from_world);
+};
+constexpr std::array<Reading, 3> kOtherReadings = {{
+    {"taken for world->camera", [](const Rotation& r) { return r.Inverse(); }},
+    {"with qw in front", WithWFirst},
+    {"taken for world->camera with qw in front",
+     [](const Rotation& r) { return WithWFirst(r).Inverse(); }},
+}};
+
 // The given orientations at the times of frames.
 RotationMap AtFrames(const std::vector<StampedRotation>& given,
                      const std::vector<double>& timestamps_s) {
@@ -84,24 +100,75 @@ RotationMap AtFrames(const std::vector<StampedRotation>& given,
   return cam_from_world;
 }
 
+[[noreturn]] void Refuse(const OrientationsFromElsewhere& given,
+                         double as_given_deg,
+                         double other_deg,
+                         const std::string& hint) {
+  throw std::runtime_error(given.name + ": its rotations disagree with the images by " +
+                           FormatNumber("%.2f", as_given_deg) + " deg (median), " + hint + " by " +
+                           FormatNumber("%.2f", other_deg) +
+                           " deg: orientations must be camera->world, qx qy qz qw, of camera "
+                           "axes x right, y down, z forward");
+}
+
 void RefuseOtherConventions(const OrientationsFromElsewhere& given,
                             const RotationMap& rotations,
                             const ViewGraph& graph) {
   const double as_given_deg = Disagreement(graph, rotations, [](const Rotation& r) { return r; });
   if (as_given_deg < kMinDisagreementDeg) return;
-  const auto refuse = [&](double other_deg, const std::string& hint) {
-    if (kClearlyBetter * other_deg > as_given_deg) return;
-    throw std::runtime_error(given.name + ": its rotations disagree with the images by " +
-                             FormatNumber("%.2f", as_given_deg) + " deg (median), " + hint +
-                             " by " + FormatNumber("%.2f", other_deg) +
-                             " deg: orientations must be camera->world, qx qy qz qw, of camera "
-                             "axes x right, y down, z forward");
-  };
-  refuse(Disagreement(graph, rotations, [](const Rotation& r) { return r.Inverse(); }),
-         "taken for world->camera");
-  refuse(Disagreement(graph, rotations, WithWFirst), "with qw in front");
-  refuse(Disagreement(graph, rotations, [](const Rotation& r) { return WithWFirst(r).Inverse(); }),
-         "taken for world->camera with qw in front");
+  for (const Reading& other : kOtherReadings) {
+    const double other_deg = Disagreement(graph, rotations, other.read);
+    if (kClearlyBetter * other_deg <= as_given_deg) {
+      Refuse(given, as_given_deg, other_deg, other.name);
+    }
+  }
+}
+
+// Median angle between the edges and the orientations with an alignment taken out, deg.
+double AlignedDisagreement(const ViewGraph& graph,
+                           const std::vector<StampedRotation>& given,
+                           std::vector<double> timestamps_s,
+                           const SensorAlignment& alignment) {
+  for (double& timestamp_s : timestamps_s) timestamp_s += alignment.offset_s;
+  return Disagreement(graph, AtFrames(given, timestamps_s), [&](const Rotation& sensor_from_world) {
+    return alignment.cam_from_sensor * sensor_from_world;
+  });
+}
+
+// The same for a sensor that is late or mounted otherwise: both are estimated for each convention.
+// Inverse and qw in front are the same but for a mounting by a quarter turn or more, so that the
+// smallest mounting tells which it is.
+void RefuseOtherAlignedConventions(const OrientationsFromElsewhere& given,
+                                   const ImageOrientations& images,
+                                   const ViewGraph& graph,
+                                   const SensorAlignment& alignment) {
+  const double as_given_deg =
+      AlignedDisagreement(graph, given.rotations, images.timestamps_s, alignment);
+  if (as_given_deg < kMinAlignedDisagreementDeg) return;
+  const char* best = nullptr;
+  double best_deg = 0.0;
+  double best_mounting_deg = std::numeric_limits<double>::infinity();
+  for (const Reading& other : kOtherReadings) {
+    std::vector<StampedRotation> rotations = given.rotations;
+    for (StampedRotation& one : rotations) {
+      one.world_from_cam = other.read(one.world_from_cam.Inverse()).Inverse();
+    }
+    const auto fused = FuseOrientations(images, rotations, {});
+    if (!fused) continue;
+    const double other_deg =
+        AlignedDisagreement(graph, rotations, images.timestamps_s, fused->alignment);
+    const double mounting_deg = fused->alignment.cam_from_sensor.AngleDeg();
+    if (kClearlyBetter * other_deg > as_given_deg || mounting_deg >= best_mounting_deg) continue;
+    best = other.name;
+    best_deg = other_deg;
+    best_mounting_deg = mounting_deg;
+  }
+  if (best == nullptr) return;
+  Refuse(given,
+         as_given_deg,
+         best_deg,
+         std::string(best) + ", and turned by " + FormatNumber("%.1f", best_mounting_deg) +
+             " deg against the camera,");
 }
 
 // Without alignment a sensor with axes of its own is of no use.
@@ -172,7 +239,9 @@ GivenRotations MatchGivenRotations(const OrientationsFromElsewhere& given,
   options.use_alignment = given.use_alignment;
   std::optional<SensorFusion> fusion;
   if (given.rotations.size() >= 2) {
-    fusion = FuseOrientations(OrientationsOfImages(timestamps_s, images), given.rotations, options);
+    const ImageOrientations of_images = OrientationsOfImages(timestamps_s, images);
+    fusion = FuseOrientations(of_images, given.rotations, options);
+    if (fusion) RefuseOtherAlignedConventions(given, of_images, images.graph, fusion->alignment);
   }
   if (!fusion) {
     throw std::runtime_error(given.name + ": has orientations for fewer than 3 of the " +

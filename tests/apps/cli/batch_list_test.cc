@@ -65,5 +65,18 @@ TEST_F(BatchList, RefusesNumbersThatItDoesNotHave) {
               HasSubstr("expected options of sbatch"));
 }
 
+TEST_F(BatchList, OfTheDocumentIsRead) {
+  const std::string text = ReadWholeFile(std::filesystem::path(ROTSLAM_DOCS_DIR) / "cluster.md");
+  const std::string fence = "```yaml\n";
+  const std::size_t start = text.find(fence) + fence.size();
+  const std::string list =
+      folder_.Write("list.yaml", text.substr(start, text.find("```", start) - start)).string();
+  const std::string script = (folder_.path() / "x.sbatch").string();
+  const CommandResult result =
+      Rotslam({"batch", list, "--out", (folder_.path() / "out").string(), "--slurm", script});
+  EXPECT_EQ(result.exit_code, 0) << result.error;
+  EXPECT_THAT(ReadWholeFile(script), HasSubstr("--array=1-4"));
+}
+
 }  // namespace
 }  // namespace rotslam

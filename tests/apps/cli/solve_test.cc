@@ -406,25 +406,31 @@ TEST_F(SolveTest, AColmapModelComesOutAsOne) {
   EXPECT_LT(CompareCenters(centers, truth, AlignCenters(centers, truth)).max, 0.05);
 }
 
-// Every other image from a camera of its own, with a lens.
+// A model whose every other image is from a camera of its own.
+void WriteTwoCameras(const fs::path& folder,
+                     const Scene& scene,
+                     const Camera& even,
+                     const Camera& odd) {
+  WriteColmapText(folder, scene);
+  ColmapModel model = ReadColmapModel(folder);
+  model.cameras = {{1, even}, {7, odd}};
+  for (auto& [frame, image] : model.images) {
+    image.camera = frame.value % 2 == 0 ? 1 : 7;
+    for (Eigen::Vector2d& keypoint_px : image.keypoints_px) {
+      const auto bearing = scene.camera.Unproject(keypoint_px - Eigen::Vector2d(0.5, 0.5));
+      keypoint_px = *model.cameras.at(image.camera).Project(*bearing) + Eigen::Vector2d(0.5, 0.5);
+    }
+  }
+  WriteColmapModel(folder, model, model.reconstruction, ColmapForm::kText);
+}
+
 TEST_F(SolveTest, SeveralCamerasGoInAndComeOut) {
   const Scene scene = Street();
   Camera other = scene.camera;
   other.model = CameraModel::kRadtan;
   other.fx = other.fy = 0.8 * scene.camera.fx;
   other.distortion[0] = -0.1;
-  WriteColmapText(Path("model"), scene);
-  ColmapModel model = ReadColmapModel(Path("model"));
-  model.cameras[7] = other;
-  for (auto& [frame, image] : model.images) {
-    if (frame.value % 2 == 0) continue;
-    image.camera = 7;
-    for (Eigen::Vector2d& keypoint_px : image.keypoints_px) {
-      const auto bearing = scene.camera.Unproject(keypoint_px - Eigen::Vector2d(0.5, 0.5));
-      keypoint_px = *other.Project(*bearing) + Eigen::Vector2d(0.5, 0.5);
-    }
-  }
-  WriteColmapModel(Path("two"), model, model.reconstruction, ColmapForm::kText);
+  WriteTwoCameras(Path("two"), scene, scene.camera, other);
   const CommandResult result =
       Rotslam({"solve", Path("two").string(), "--out", Path("out").string()});
   ASSERT_EQ(result.exit_code, 0) << result.error;
@@ -436,6 +442,40 @@ TEST_F(SolveTest, SeveralCamerasGoInAndComeOut) {
   EXPECT_LT(FiguresOf(after, after.reconstruction).mean_error_px, 0.6);
   for (const auto& [frame, image] : after.images)
     EXPECT_EQ(image.camera, frame.value % 2 == 0 ? 1 : 7);
+  // The map has none of these cameras.
+  EXPECT_EQ(Rotslam({"plot", Path("out").string()}).exit_code, 0);
+  for (const char* format : {"colmap", "nerf", "openmvg"}) {
+    const CommandResult exported = Rotslam(
+        {"export", Path("out").string(), "--to", format, "--out", Path("exported").string()});
+    EXPECT_EQ(exported.exit_code, 1);
+    EXPECT_THAT(exported.error, HasSubstr("its images have several cameras"));
+  }
+}
+
+// A fisheye sees what a pinhole stretches: an error of a pixel far from its centre is many there.
+TEST_F(SolveTest, FisheyesAreNotTakenForPinholes) {
+  const Scene scene = Street();
+  Camera even = scene.camera;
+  even.model = CameraModel::kEquidistant;
+  Camera odd = even;
+  odd.fx = odd.fy = 1.2 * even.fx;
+  odd.distortion[0] = 0.01;
+  WriteTwoCameras(Path("two"), scene, even, odd);
+  const ColmapModel model = ReadColmapModel(Path("two"));
+  EXPECT_EQ(model.camera.model, CameraModel::kEquidistant);
+  // A pixel of the image is what the deviation says, wherever it is.
+  for (const Track& track : model.reconstruction.tracks) {
+    for (const Observation& one : track.observations) {
+      const Camera& camera = one.frame.value % 2 == 0 ? even : odd;
+      const Eigen::Vector2d seen_px = *camera.Project(one.bearing);
+      Eigen::Matrix2d moved;
+      for (int k = 0; k < 2; ++k) {
+        const auto bearing = camera.Unproject(seen_px + 1e-3 * Eigen::Vector2d::Unit(k));
+        moved.col(k) = (*model.camera.Project(*bearing) - one.keypoint_px) / 1e-3;
+      }
+      EXPECT_NEAR(one.sigma_px, std::sqrt(std::abs(moved.determinant())), 1e-3);
+    }
+  }
 }
 
 // What `run` leaves goes into other commands, and so does this.

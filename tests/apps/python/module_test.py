@@ -341,6 +341,15 @@ class Rotations(unittest.TestCase):
         self.assertEqual(result["num_inliers"], len(i) - 1)
         self.assertGreater(result["sigmas"][3], 50)
         np.testing.assert_array_equal(result["component"], 0)
+        self.assertGreaterEqual(result["support"].min(), 6)
+        self.assertEqual(result["covariance"].shape, (8, 3, 3))
+        # Seven edges of 0.01 rad to views that are as uncertain.
+        deviations = np.sqrt(np.einsum("kii->ki", result["covariance"]))
+        self.assertTrue(np.all((deviations > 0.002) & (deviations < 0.006)), deviations)
+        chain = rotslam.average_rotations(np.r_[i, 7], np.r_[j, 8],
+                                          np.concatenate([j_from_i, [np.eye(3)]]), sigma_rad=0.01)
+        self.assertEqual(chain["support"][8], 1)
+        self.assertGreater(chain["covariance"][8, 0, 0], 0.7e-4)
         certificate = rotslam.certify_rotations(i, j, j_from_i, 1.0 * (result["sigmas"] < 6), found)
         self.assertLess(certificate["cost"], 1e-9)
         again = rotslam.average_rotations(i, j, j_from_i, start=truth,

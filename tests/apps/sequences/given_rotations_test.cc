@@ -118,6 +118,24 @@ TEST_F(GivenRotations, OfAnotherConventionAreRefusedByItsName) {
                 pose.world_from_cam = pose.world_from_cam * cam_from_imu;
               }))),
               HasSubstr("another sensor's axes"));
+  // Mounted wrong and late, too, with or without --align.
+  const auto mount = [](StampedPose& pose) {
+    pose.world_from_cam = pose.world_from_cam * Rotation::Exp({0.4, -0.5, 0.2});
+    pose.timestamp_s += 0.04;
+  };
+  const std::string inverted = Changed([&](StampedPose& pose) {
+    mount(pose);
+    pose.world_from_cam = pose.world_from_cam.Inverse();
+  });
+  const auto says =
+      AllOf(HasSubstr("given.txt: "), HasSubstr("taken for world->camera, and turned"));
+  EXPECT_THAT(Refusal(RunWith(inverted)), says);
+  EXPECT_THAT(Refusal(Run(Good(), {"--rotations", inverted, "--align"})), says);
+  EXPECT_THAT(Refusal(RunWith(Changed([&](StampedPose& pose) {
+                mount(pose);
+                put_w_first(pose);
+              }))),
+              HasSubstr("with qw in front, and turned"));
 }
 
 TEST_F(GivenRotations, MayCoverPartOfTheFrames) {
