@@ -31,7 +31,7 @@ bool AllFinite(const BundleState& state) {
   });
 }
 
-// The state with tracks drawn at random until every frame has `num_wanted` observations.
+// The state with tracks drawn at random until every frame that moves has `num_wanted` observations.
 BundleState WithSomeTracks(const BundleState& state, int num_wanted) {
   std::vector<std::size_t> order(state.tracks.size());
   std::iota(order.begin(), order.end(), std::size_t{0});
@@ -44,7 +44,7 @@ BundleState WithSomeTracks(const BundleState& state, int num_wanted) {
     const std::vector<ObservationState>& observations = state.tracks[t].observations;
     taken[t] =
         std::any_of(observations.begin(), observations.end(), [&](const ObservationState& one) {
-          return count[one.frame] < num_wanted;
+          return !state.frames[one.frame].fixed && count[one.frame] < num_wanted;
         });
     if (!taken[t]) continue;
     for (const ObservationState& one : observations) ++count[one.frame];
@@ -58,6 +58,15 @@ BundleState WithSomeTracks(const BundleState& state, int num_wanted) {
     if (taken[t]) part.tracks.push_back(state.tracks[t]);
   }
   return part;
+}
+
+// The points that are known, for Placement::kWhereKnown.
+void SetPositions(const PointMap& point_in_world, BundleState& state) {
+  for (TrackState& entry : state.tracks) {
+    const auto known = point_in_world.find(entry.track->id);
+    entry.has_position = known != point_in_world.end();
+    if (entry.has_position) entry.position = known->second;
+  }
 }
 
 // Takes the cameras over from a part, and how its observations are weighed.
@@ -344,6 +353,7 @@ BundleResult RefineBundle(const BundleProblem& problem,
                           const TrackCompletion& complete) {
   const auto start = std::chrono::steady_clock::now();
   BundleState state = MakeBundleState(problem, options);
+  if (options.start_at_points) SetPositions(problem.start.point_in_world, state);
   BundleResult result;
   Rounds rounds(problem.camera, options, result);
   const bool in_part = options.preparing_observations > 0 && options.fine.enabled;
@@ -368,7 +378,8 @@ BundleResult RefineBundle(const BundleProblem& problem,
   }
   const BundleRound final_round = rounds.Narrow(preparing);
   if (part) TakeCameras(*part, options.num_threads, state);
-  rounds.RunFinal(final_round, part ? Placement::kAnywhere : Placement::kNearby, state);
+  const Placement unseen = options.start_at_points ? Placement::kWhereKnown : Placement::kAnywhere;
+  rounds.RunFinal(final_round, part ? unseen : Placement::kNearby, state);
 
   BundleSummary& summary = result.summary;
   for (const BundleRoundSummary& round : summary.rounds) summary.iterations += round.iterations;
@@ -400,11 +411,7 @@ BundleResult RefineBundle(const BundleProblem& problem,
 
 Reconstruction TriangulateTracks(BundleProblem problem, const BundleOptions& options) {
   BundleState state = MakeBundleState(problem, options);
-  for (TrackState& entry : state.tracks) {
-    const auto known = problem.start.point_in_world.find(entry.track->id);
-    entry.has_position = known != problem.start.point_in_world.end();
-    if (entry.has_position) entry.position = known->second;
-  }
+  SetPositions(problem.start.point_in_world, state);
   ClassifyAll(options.fine, Placement::kWhereKnown, options, state);
   Reconstruction map = std::move(problem.start);
   map.point_in_world.clear();
