@@ -132,7 +132,8 @@ class ZoomPath {
     const std::vector<Track> tracks = Tracks();
     ZoomProblem problem = {
         before_.camera, poses_, {}, unzoomed_, alike_, before_.moves, {}, tracks, noise_px_};
-    problem.known.insert(poses_.begin()->first);
+    // These hold place and scale.
+    problem.known = {before_.poses.begin()->first, before_.poses.rbegin()->first};
     for (const auto& [frame, pose] : before_.poses) problem.unzoomed.insert(frame);
     for (const auto& [track, point] : points_) {
       if (const auto place = PlaceOf(point)) problem.points[track] = *place;
@@ -158,8 +159,10 @@ class ZoomPath {
     };
     int first = 0;
     while (first < num_frames && !is_changing(first)) ++first;
-    int last = num_frames;
-    while (last > first && !is_changing(last - 1)) --last;
+    int last = first;
+    while (last < num_frames && (is_changing(last) || std::abs(log_scales[last]) < kBegun)) {
+      ++last;
+    }
     const double at_end = Median({log_scales.begin() + last, log_scales.end()}, log_scales.back());
     if (std::abs(at_end) < kBegun) return false;
     for (int n = 0; n < first; ++n) {
