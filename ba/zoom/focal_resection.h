@@ -23,7 +23,7 @@ struct FocalResection {
 /// @param observations  as the zoomed image shows them; their sigmas and blurs are not used.
 /// @param moves         false: the centre stays, and the points may be directions from it.
 /// @return  nullopt with fewer than 20 inliers, or when they leave the focal length open.
-/// Error:   0.3 % of the focal length for 200 points at 0.3 px (ba tests).
+/// Error:   0.1 % of the focal length for 500 points at 0.3 px (tests of FollowZoom).
 std::optional<FocalResection> ResectWithFocal(const Camera& camera,
                                               const std::vector<PointObservation2D3D>& observations,
                                               const ZoomedPose& start,
