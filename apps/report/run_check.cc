@@ -217,12 +217,15 @@ Reason Zooms(const RunFacts& facts) {
   AddFrames(IntegerIn(facts, "/lens_checks/zoom/first_frame"),
             IntegerIn(facts, "/lens_checks/zoom/last_frame"),
             frames);
+  const nlohmann::ordered_json::json_pointer followed("/lens_checks/zooms_followed");
+  const bool is_followed = facts.summary.contains(followed) && facts.summary.at(followed);
   return CheckReason{Verdict::kLookAt,
                      DescribeFrames(frames),
                      "the lens zooms: the focal length becomes " +
                          Rounded("%.2f", NumberIn(facts, "/lens_checks/zoom/factor")) +
-                         " times as long, and orientations, path and map are less certain from "
-                         "there on"};
+                         (is_followed ? " times as long. It is followed, to a percent or so"
+                                      : " times as long, and orientations, path and map are less "
+                                        "certain from there on")};
 }
 
 Reason ShutterGuessed(const RunFacts& facts) {

@@ -5,11 +5,20 @@
 #include <vector>
 
 #include "apps/slam/map/resect_frames.h"
+#include "apps/slam/zoom/without_zoom.h"
 #include "rotodom/motion_blur/blurred_patch.h"
 #include "rotodom/motion_blur/keypoint_blur.h"
 
 namespace rotslam {
 namespace {
+
+// Makes a motion one by the rows of an image without its zoom: from one to the next of these, more
+// time passes.
+void FollowReadout(double scale, MapView& view) {
+  double power = 1.0;
+  for (auto column : view.motion.coefficients.colwise()) column *= power *= scale;
+  view.velocity *= scale;
+}
 
 // The frames before and after one, or the two nearest on one side where the other has none.
 std::array<FrameId, 2> NextTo(FrameId frame, const RotationMap& cam_from_world) {
@@ -39,9 +48,11 @@ MapViews ReadMapViews(ImageProvider& images,
       frames,
       [&](FrameId frame, const cv::Mat& image) {
         const FrameMasks& masks = orientations.masks;
-        views[frame] = masks.IsEmpty()
-                           ? MakeMapView(image)
-                           : MakeMapView({image, masks.Of(orientations.image_names[frame.value])});
+        MaskedImage shown = image;
+        if (!masks.IsEmpty()) shown.mask = masks.Of(orientations.image_names[frame.value]);
+        const double scale = ScaleOf(orientations.focal_scales, frame);
+        views[frame] =
+            MakeMapView(scale == 1.0 ? shown : WithoutZoom(shown, orientations.camera, scale));
       },
       tell);
   return views;
@@ -87,6 +98,10 @@ void SetMotions(const MotionSources& sources, const Reconstruction& map, MapView
     // The map may have corrected the orientations since the odometry.
     if (others.size() == 2) view.motion = MotionThrough(here, others);
     view.velocity = PolynomialThrough(ways).col(0);
+  }
+  for (auto& [frame, view] : views) {
+    const double scale = ScaleOf(sources.orientations.focal_scales, frame);
+    if (scale != 1.0) FollowReadout(scale, view);
   }
 }
 

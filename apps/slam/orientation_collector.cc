@@ -10,7 +10,10 @@
 #include <utility>
 #include <vector>
 
+#include "apps/slam/build_map.h"
 #include "apps/slam/connected_frames.h"
+#include "apps/slam/zoom/follow_zooms.h"
+#include "apps/slam/zoom/without_zoom.h"
 
 namespace rotslam {
 namespace {
@@ -119,6 +122,54 @@ void CheckLens(const RelativeRotationOptions& options, Orientations& orientation
   orientations.zooms = FindZooms(camera, features, orientations.graph, options);
 }
 
+// The map of a part of the frames, for MapOfPart.
+std::optional<FramesBeforeZoom> MapBeforeZoom(const OdometryResult& part,
+                                              const Camera& camera,
+                                              const Orientations& orientations,
+                                              const SlamOptions& options) {
+  Orientations of_part;
+  static_cast<OdometryResult&>(of_part) = part;
+  of_part.camera = camera;
+  of_part.timestamps_s = orientations.timestamps_s;
+  of_part.image_names = orientations.image_names;
+  of_part.exposure_s = orientations.exposure_s;
+  SlamObserver nobody;
+  const MapResult map = BuildMap(of_part, options, nullptr, nobody);
+  FramesBeforeZoom before;
+  before.camera = map.camera;
+  before.moves = !map.rotates_throughout;
+  if (!map.failure.empty()) return std::nullopt;
+  const int component = map.frame_poses.rbegin()->second.component;
+  for (const auto& [frame, pose] : map.frame_poses) {
+    const bool is_measured = pose.state == PoseState::kMeasured && pose.component == component;
+    if (is_measured || !before.moves) {
+      before.poses[frame] = {map.cam_from_world.at(frame), map.center_in_world.at(frame)};
+    }
+  }
+  return before;
+}
+
+// Follows the zooms that were found, where the images allow it.
+void Follow(const SlamOptions& options, Orientations& orientations) {
+  if (orientations.zooms.empty() || orientations.given) return;
+  auto followed = FollowZooms(orientations,
+                              orientations.camera,
+                              orientations.zooms,
+                              [&](const OdometryResult& part, const Camera& camera) {
+                                return MapBeforeZoom(part, camera, orientations, options);
+                              },
+                              {options.rotodom, options.seed, options.num_threads});
+  if (!followed) return;
+  static_cast<OdometryResult&>(orientations) = std::move(followed->odometry);
+  orientations.camera = followed->camera;
+  orientations.zooms = std::move(followed->zooms);
+  orientations.focal_scales = std::move(followed->scales);
+  TakeZoomOut(orientations.camera, orientations.focal_scales, orientations.places);
+  orientations.inlier_edges =
+      CountInlierEdges(orientations.graph, orientations.cam_from_world, options.rotodom.averaging);
+  orientations.breaks = FindBreaks(orientations.graph, orientations.cam_from_world);
+}
+
 Orientations StartWith(const FoundInImages& known,
                        const Camera& camera,
                        const OrientationInputs& inputs) {
@@ -200,6 +251,7 @@ Orientations OrientationCollector::Finish(SlamObserver& observer,
   if (commit) commit();
   ClassifyFrames(inputs_, options_.rotodom.averaging, orientations_);
   if (inputs_.check_lens) CheckLens(options_.rotodom.relative_rotation, orientations_);
+  if (inputs_.follow_zooms) Follow(options_, orientations_);
   observer.OnEnd(SlamStage::kOrientations, orientations_);
   return std::move(orientations_);
 }

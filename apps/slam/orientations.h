@@ -13,6 +13,7 @@
 #include "apps/slam/masks/frame_masks.h"
 #include "apps/slam/observer.h"
 #include "apps/slam/options.h"
+#include "rotodom/camera/focal_scale.h"
 #include "rotodom/loop/looped_odometry.h"
 #include "rotodom/masks/static_content.h"
 #include "rotodom/motion_blur/keypoint_blur.h"
@@ -34,6 +35,9 @@ struct Orientations : OdometryResult {
   std::vector<FrameThumbnail> thumbnails;  // by frame id
   FisheyeCheck fisheye;                    // whether the lens is another one than the calibration's
   std::vector<Zoom> zooms;                 // where the focal length changes
+  // Not empty: the zooms are followed. Features, relative rotations and orientations are those that
+  // `camera` would have shown without them.
+  FocalScales focal_scales;
   // Set: `cam_from_world` and `covariance` are those of images and given orientations together.
   std::optional<GivenRotations> given;
   // Pixels of the images that were worked with per pixel of the original ones, see WorkingSize.
@@ -77,6 +81,8 @@ struct OrientationInputs {
   StaticContent static_content;  // found before
   // Check whether the calibration fits the images (Orientations::fisheye, zooms).
   bool check_lens = true;
+  // Follow zooms (Orientations::focal_scales).
+  bool follow_zooms = true;
 };
 
 /// Interpolates the orientation of the frames in `unknown` in time between the nearest other

@@ -15,6 +15,7 @@
 #include "output/export/colmap_model.h"
 #include "output/files/atomic_file.h"
 #include "output/files/binary_file.h"
+#include "output/map/frame_cameras.h"
 #include "output/map/map_keypoints.h"
 #include "rotodom/types/options.h"
 
@@ -190,7 +191,7 @@ void AddVerified(const RunMap& map,
     const Eigen::Vector2f& pixel = view_graph.keypoints_px.at(frame)[keypoint];
     const auto& of_frame = number_at.at(frame);
     const auto number = of_frame.find({pixel.x(), pixel.y()});
-    const auto bearing = map.camera.Unproject(pixel.cast<double>());
+    const auto bearing = CameraOf(map, frame).Unproject(pixel.cast<double>());
     return number == of_frame.end() || !bearing
                ? std::nullopt
                : std::optional(std::pair(number->second, *bearing));
@@ -261,20 +262,26 @@ Eigen::Matrix3d Intrinsics(const Camera& camera) {
 
 void InsertImages(const Database& database, const RunMap& map) {
   const auto keypoints = ListKeypoints(map);
-  const ColmapCamera camera = ToColmap(map.camera);
-  BinaryWriter parameters;
-  for (const double value : camera.parameters) parameters.Put(value);
-  Insertion(database, "INSERT INTO cameras VALUES (?, ?, ?, ?, ?, 1)")
-      .Integer(kColmapCameraId)
-      .Integer(camera.model_id)
-      .Integer(map.camera.width)
-      .Integer(map.camera.height)
-      .Blob(parameters)
-      .Run();
+  const CameraList cameras = ListCameras(map);
+  for (std::size_t k = 0; k < cameras.cameras.size(); ++k) {
+    const ColmapCamera camera = ToColmap(cameras.cameras[k]);
+    BinaryWriter parameters;
+    for (const double value : camera.parameters) parameters.Put(value);
+    Insertion(database, "INSERT INTO cameras VALUES (?, ?, ?, ?, ?, 1)")
+        .Integer(static_cast<std::int64_t>(kColmapCameraId + k))
+        .Integer(camera.model_id)
+        .Integer(cameras.cameras[k].width)
+        .Integer(cameras.cameras[k].height)
+        .Blob(parameters)
+        .Run();
+  }
   Insertion image(database, "INSERT INTO images (image_id, name, camera_id) VALUES (?, ?, ?)");
   Insertion corners(database, "INSERT INTO keypoints VALUES (?, ?, 2, ?)");
   for (const MapFrame& frame : map.frames) {
-    image.Integer(ColmapImageId(frame.id)).Text(frame.image).Integer(kColmapCameraId).Run();
+    image.Integer(ColmapImageId(frame.id))
+        .Text(frame.image)
+        .Integer(kColmapCameraId + cameras.of_frame.at(frame.id))
+        .Run();
     BinaryWriter pixels;
     const std::vector<MapKeypoint>& list = keypoints.at(frame.id);
     for (const MapKeypoint& keypoint : list) {
@@ -303,15 +310,18 @@ struct MatchTable {
 };
 
 // Its columns behind `config`.
-void InsertGeometry(const PairPose& pose, const Camera& camera, Insertion& row) {
-  const bool is_undistorted = camera.model == CameraModel::kPinhole;
-  const Eigen::Matrix3d K = Intrinsics(camera);
-  const Eigen::Matrix3d K_inverse = K.inverse();
+void InsertGeometry(const PairPose& pose,
+                    const Camera& camera_i,
+                    const Camera& camera_j,
+                    Insertion& row) {
+  const bool is_undistorted = camera_i.model == CameraModel::kPinhole;
+  const Eigen::Matrix3d K_i_inverse = Intrinsics(camera_i).inverse();
+  const Eigen::Matrix3d K_j = Intrinsics(camera_j);
   const Eigen::Matrix3d E = pose.Essential();
-  const Eigen::Matrix3d H = K * pose.j_from_i.Matrix() * K_inverse;
+  const Eigen::Matrix3d H = K_j * pose.j_from_i.Matrix() * K_i_inverse;
   const bool has_f = is_undistorted && !pose.is_panoramic;
   const bool has_h = is_undistorted && pose.is_panoramic;
-  has_f ? row.Blob(RowMajor(K_inverse.transpose() * E * K_inverse)) : row.Null();
+  has_f ? row.Blob(RowMajor(K_j.inverse().transpose() * E * K_i_inverse)) : row.Null();
   pose.is_panoramic ? row.Null() : row.Blob(RowMajor(E));
   has_h ? row.Blob(RowMajor(H)) : row.Null();
   const Eigen::Quaterniond& q = pose.j_from_i.Quaternion();
@@ -354,7 +364,7 @@ void InsertPairs(const Database& database,
 
     verified.Integer(pair_id).Integer(good.rows).Blob(good.numbers);
     verified.Integer(pose.is_panoramic ? kPanoramic : kCalibrated);
-    InsertGeometry(pose, map.camera, verified);
+    InsertGeometry(pose, CameraOf(map, pair.first), CameraOf(map, pair.second), verified);
     verified.Run();
   }
 }

@@ -29,8 +29,8 @@ struct ColmapDatabaseOptions {
 };
 
 /// Writes a COLMAP database (SQLite, its version 3.8; later ones take it over when they open it):
-/// one camera, the frames as images with the ids of WriteColmapModel, their sightings as keypoints
-/// in its order, and per pair of frames
+/// the cameras (one, unless the lens zooms), the frames as images with the ids of WriteColmapModel,
+/// their sightings as keypoints in its order, and per pair of frames
 /// - `matches`: all tracks that both show, and what the view-graph has verified between them;
 /// - `two_view_geometries`: what the view-graph has verified, and the tracks that agree with the
 ///   poses, unless the track's point fits one of the two sightings only; E (of unit translation), F

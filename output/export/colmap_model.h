@@ -56,7 +56,7 @@ struct ColmapCamera {
 ColmapCamera ToColmap(const Camera& camera);
 
 /// Ids in COLMAP's files and database: they start from 1.
-inline constexpr int kColmapCameraId = 1;
+inline constexpr int kColmapCameraId = 1;  // of the first one of ListCameras
 inline int ColmapImageId(FrameId frame) { return frame.value + 1; }
 inline int ColmapPointId(TrackId track) { return track.value + 1; }
 

@@ -10,6 +10,7 @@
 #include "output/export/colmap_model.h"
 #include "output/files/atomic_file.h"
 #include "output/files/binary_file.h"
+#include "output/map/frame_cameras.h"
 #include "output/map/map_keypoints.h"
 #include "rotodom/types/text_file.h"
 
@@ -33,25 +34,29 @@ std::size_t CountPoints(const RunMap& map) {
 }
 
 std::string BinaryCameras(const RunMap& map) {
-  const ColmapCamera camera = ToColmap(map.camera);
+  const std::vector<Camera> cameras = ListCameras(map).cameras;
   BinaryWriter writer;
-  writer.Put(std::uint64_t{1});
-  writer.Put(std::uint32_t{kColmapCameraId});
-  writer.Put(static_cast<std::int32_t>(camera.model_id));
-  writer.Put(static_cast<std::uint64_t>(map.camera.width));
-  writer.Put(static_cast<std::uint64_t>(map.camera.height));
-  for (const double value : camera.parameters) writer.Put(value);
+  writer.Put(static_cast<std::uint64_t>(cameras.size()));
+  for (std::size_t k = 0; k < cameras.size(); ++k) {
+    const ColmapCamera camera = ToColmap(cameras[k]);
+    writer.Put(static_cast<std::uint32_t>(kColmapCameraId + k));
+    writer.Put(static_cast<std::int32_t>(camera.model_id));
+    writer.Put(static_cast<std::uint64_t>(cameras[k].width));
+    writer.Put(static_cast<std::uint64_t>(cameras[k].height));
+    for (const double value : camera.parameters) writer.Put(value);
+  }
   return writer.bytes();
 }
 
 std::string BinaryImages(const RunMap& map,
                          const std::map<FrameId, std::vector<MapKeypoint>>& keypoints) {
+  const CameraList cameras = ListCameras(map);
   BinaryWriter writer;
   writer.Put(static_cast<std::uint64_t>(map.frames.size()));
   for (const MapFrame& frame : map.frames) {
     writer.Put(static_cast<std::uint32_t>(ColmapImageId(frame.id)));
     for (const double value : PoseNumbers(frame)) writer.Put(value);
-    writer.Put(std::uint32_t{kColmapCameraId});
+    writer.Put(static_cast<std::uint32_t>(kColmapCameraId + cameras.of_frame.at(frame.id)));
     writer.PutName(frame.image);
     const std::vector<MapKeypoint>& list = keypoints.at(frame.id);
     writer.Put(static_cast<std::uint64_t>(list.size()));
@@ -90,22 +95,28 @@ std::string BinaryPoints(const RunMap& map, const std::vector<std::vector<int>>&
 void Add(std::string& text, double value) { text += FormatNumber(" %.17g", value); }
 
 std::string TextCameras(const RunMap& map) {
-  const ColmapCamera camera = ToColmap(map.camera);
-  std::string text = "# CAMERA_ID MODEL WIDTH HEIGHT PARAMETERS\n" +
-                     std::to_string(kColmapCameraId) + " " + camera.model + " " +
-                     std::to_string(map.camera.width) + " " + std::to_string(map.camera.height);
-  for (const double value : camera.parameters) Add(text, value);
-  return text + "\n";
+  const std::vector<Camera> cameras = ListCameras(map).cameras;
+  std::string text = "# CAMERA_ID MODEL WIDTH HEIGHT PARAMETERS\n";
+  for (std::size_t k = 0; k < cameras.size(); ++k) {
+    const ColmapCamera camera = ToColmap(cameras[k]);
+    text += std::to_string(kColmapCameraId + k) + " " + camera.model + " " +
+            std::to_string(cameras[k].width) + " " + std::to_string(cameras[k].height);
+    for (const double value : camera.parameters) Add(text, value);
+    text += "\n";
+  }
+  return text;
 }
 
 std::string TextImages(const RunMap& map,
                        const std::map<FrameId, std::vector<MapKeypoint>>& keypoints) {
+  const CameraList cameras = ListCameras(map);
   std::string text =
       "# IMAGE_ID QW QX QY QZ TX TY TZ CAMERA_ID NAME, then X Y POINT3D_ID of its keypoints\n";
   for (const MapFrame& frame : map.frames) {
     text += std::to_string(ColmapImageId(frame.id));
     for (const double value : PoseNumbers(frame)) Add(text, value);
-    text += " " + std::to_string(kColmapCameraId) + " " + frame.image + "\n";
+    text += " " + std::to_string(kColmapCameraId + cameras.of_frame.at(frame.id)) + " " +
+            frame.image + "\n";
     std::string line;
     for (const MapKeypoint& keypoint : keypoints.at(frame.id)) {
       const Track& track = map.tracks[keypoint.track].track;

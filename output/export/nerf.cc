@@ -8,6 +8,7 @@
 #include "output/export/lens_fit.h"
 #include "output/export/scene_box.h"
 #include "output/files/atomic_file.h"
+#include "output/map/frame_cameras.h"
 #include "output/map/map_keypoints.h"
 #include "output/map/ply.h"
 
@@ -65,12 +66,15 @@ Camera ReadableCamera(const std::filesystem::path& path,
   return fit.camera;
 }
 
-Json CameraToJson(const Camera& camera, NerfReader reader) {
+Json ModelToJson(const Camera& camera) {
+  const bool is_fisheye = camera.model == CameraModel::kEquidistant;
+  return {{"camera_model", is_fisheye ? "OPENCV_FISHEYE" : "OPENCV"}, {"is_fisheye", is_fisheye}};
+}
+
+Json NumbersToJson(const Camera& camera, NerfReader reader) {
   const bool is_fisheye = camera.model == CameraModel::kEquidistant;
   const auto& d = camera.distortion;
-  Json json = {{"camera_model", is_fisheye ? "OPENCV_FISHEYE" : "OPENCV"},
-               {"is_fisheye", is_fisheye},
-               {"w", camera.width},
+  Json json = {{"w", camera.width},
                {"h", camera.height},
                {"fl_x", camera.fx},
                {"fl_y", camera.fy},
@@ -87,6 +91,15 @@ Json CameraToJson(const Camera& camera, NerfReader reader) {
   json["p2"] = d[3];
   if (reader == NerfReader::kNerfstudio) json["k3"] = d[4];
   return json;
+}
+
+// The readers' camera with the focal length and principal point that a frame's camera has.
+Camera ZoomedLike(const Camera& own, const Camera& of_map, Camera readable) {
+  readable.fx *= own.fx / of_map.fx;
+  readable.fy *= own.fy / of_map.fy;
+  readable.cx = own.cx + own.fx / of_map.fx * (readable.cx - of_map.cx);
+  readable.cy = own.cy + own.fy / of_map.fy * (readable.cy - of_map.cy);
+  return readable;
 }
 
 // Rows of `matrix`.
@@ -153,7 +166,10 @@ std::vector<std::string> WriteNerfTransforms(const std::filesystem::path& path,
     notes.push_back(std::to_string(box.num_outside) + " of " + std::to_string(cloud.size()) +
                     " points lie too far away for instant-ngp's largest box");
   }
-  Json json = CameraToJson(camera, reader);
+  Json json = ModelToJson(camera);
+  // nerfstudio reads those of a frame only where the file has none for all.
+  const bool is_alike = map.frame_cameras.empty();
+  if (is_alike) json.update(NumbersToJson(camera, reader));
   json["aabb_scale"] = box.aabb_scale;
   json["scale"] = box.scale;
   json["offset"] = {box.offset.x(), box.offset.y(), box.offset.z()};
@@ -161,8 +177,13 @@ std::vector<std::string> WriteNerfTransforms(const std::filesystem::path& path,
   if (!cloud.empty()) json["ply_file_path"] = WritePointsBeside(path, cloud);
   json["frames"] = Json::array();
   for (const MapFrame& frame : map.frames) {
-    json["frames"].push_back({{"file_path", (images / frame.image).generic_string()},
-                              {"transform_matrix", WorldFromCamera(frame)}});
+    Json& entry = json["frames"].emplace_back();
+    entry = {{"file_path", (images / frame.image).generic_string()},
+             {"transform_matrix", WorldFromCamera(frame)}};
+    if (!is_alike) {
+      entry["is_fisheye"] = json["is_fisheye"];
+      entry.update(NumbersToJson(ZoomedLike(CameraOf(map, frame.id), map.camera, camera), reader));
+    }
   }
   ReplaceFile(path, json.dump(1, ' ', false, Json::error_handler_t::replace) + "\n");
   return notes;

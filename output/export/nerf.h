@@ -18,6 +18,7 @@ enum class NerfReader {
 /// Writes `transforms.json` as nerfstudio and instant-ngp read it:
 /// - the camera (OPENCV, or OPENCV_FISHEYE; the principal point gains 0.5, like COLMAP's). A lens
 ///   that the readers have no model of is refitted to the one of theirs that comes nearest;
+/// - where the lens zooms, the numbers of the camera per frame instead, which both read;
 /// - per frame its image, relative to the file's folder, and the pose camera->world in OpenGL's
 ///   camera axes: x right, y up, z back. The world stays as it is, which `applied_transform` says:
 ///   nerfstudio would take another one for granted where a COLMAP model lies beside the file;

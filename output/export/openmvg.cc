@@ -6,6 +6,7 @@
 
 #include "output/export/distortion_json.h"
 #include "output/files/atomic_file.h"
+#include "output/map/frame_cameras.h"
 #include "output/map/map_keypoints.h"
 
 namespace rotslam {
@@ -19,13 +20,14 @@ constexpr std::uint32_t kNewObject = 0x80000000U;
 // In place of a type's number: the object is of the type that the pointer says.
 constexpr std::uint32_t kDeclaredType = 0x40000000U;
 
-Json ViewToJson(const MapFrame& frame, const Camera& camera, std::uint32_t number) {
+// @param intrinsic  position among the cameras.
+Json ViewToJson(const MapFrame& frame, const Camera& camera, int intrinsic, std::uint32_t number) {
   const Json data = {{"local_path", ""},
                      {"filename", frame.image},
                      {"width", camera.width},
                      {"height", camera.height},
                      {"id_view", frame.id.value},
-                     {"id_intrinsic", 0},
+                     {"id_intrinsic", intrinsic},
                      {"id_pose", frame.id.value}};
   return {{"key", frame.id.value},
           {"value",
@@ -33,7 +35,7 @@ Json ViewToJson(const MapFrame& frame, const Camera& camera, std::uint32_t numbe
             {"ptr_wrapper", {{"id", kNewObject + number}, {"data", data}}}}}};
 }
 
-Json IntrinsicToJson(const Camera& camera, std::uint32_t number) {
+Json IntrinsicToJson(const Camera& camera, int key, std::uint32_t number) {
   Json data = {{"width", camera.width},
                {"height", camera.height},
                {"focal_length", camera.MeanFocal()},
@@ -47,11 +49,11 @@ Json IntrinsicToJson(const Camera& camera, std::uint32_t number) {
     type = "fisheye";
     data["fisheye"] = {d[0], d[1], d[2], d[3]};
   }
-  return {{"key", 0},
-          {"value",
-           {{"polymorphic_id", kNewObject + 1},
-            {"polymorphic_name", type},
-            {"ptr_wrapper", {{"id", kNewObject + number}, {"data", data}}}}}};
+  Json value = {{"polymorphic_id", key == 0 ? kNewObject + 1 : 1}};
+  // Its name stands where it comes first.
+  if (key == 0) value["polymorphic_name"] = type;
+  value["ptr_wrapper"] = {{"id", kNewObject + number}, {"data", data}};
+  return {{"key", key}, {"value", value}};
 }
 
 Json PoseToJson(const MapFrame& frame) {
@@ -91,12 +93,17 @@ void WriteOpenMvg(const std::filesystem::path& path,
   for (const char* part : {"views", "intrinsics", "extrinsics", "structure", "control_points"}) {
     json[part] = Json::array();
   }
+  const CameraList cameras = ListCameras(map);
   std::uint32_t number = 0;
   for (const MapFrame& frame : map.frames) {
-    json["views"].push_back(ViewToJson(frame, map.camera, ++number));
+    const int intrinsic = cameras.of_frame.at(frame.id);
+    json["views"].push_back(ViewToJson(frame, cameras.cameras[intrinsic], intrinsic, ++number));
     json["extrinsics"].push_back(PoseToJson(frame));
   }
-  json["intrinsics"].push_back(IntrinsicToJson(map.camera, ++number));
+  for (std::size_t k = 0; k < cameras.cameras.size(); ++k) {
+    json["intrinsics"].push_back(
+        IntrinsicToJson(cameras.cameras[k], static_cast<int>(k), ++number));
+  }
   const std::vector<std::vector<int>> numbers = NumberKeypoints(map);
   for (std::size_t t = 0; t < map.tracks.size(); ++t) {
     if (HasPoint(map.tracks[t])) {

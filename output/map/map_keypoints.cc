@@ -2,6 +2,8 @@
 
 #include <algorithm>
 
+#include "output/map/frame_cameras.h"
+
 namespace rotslam {
 namespace {
 
@@ -57,8 +59,9 @@ double MeanErrorPx(const RunMap& map, const MapTrack& track) {
     const Observation& observation = track.track.observations[k];
     const MapFrame* frame = FindFrame(map, observation.frame);
     if (frame == nullptr) continue;
-    const auto pixel = map.camera.Project(frame->cam_from_world *
-                                          (*track.point_in_world - frame->center_in_world));
+    const auto pixel =
+        CameraOf(map, frame->id)
+            .Project(frame->cam_from_world * (*track.point_in_world - frame->center_in_world));
     if (!pixel) continue;
     sum_px += (*pixel - observation.keypoint_px).norm();
     ++count;

@@ -203,6 +203,7 @@ std::vector<MapTrack> JoinTracks(const std::vector<Track>& tracks, const Reconst
 RunMap PartOf(const RunMap& map, const std::set<FrameId>& frames) {
   RunMap part;
   part.camera = map.camera;
+  part.frame_cameras = map.frame_cameras;
   part.image_folder = map.image_folder;
   part.is_video = map.is_video;
   part.level_scale = map.level_scale;

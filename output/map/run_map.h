@@ -2,6 +2,7 @@
 
 #include <cstdint>
 #include <filesystem>
+#include <map>
 #include <optional>
 #include <set>
 #include <string>
@@ -42,7 +43,10 @@ struct MapEdge {
 
 /// The map of a run, from which other systems can start.
 struct RunMap {
-  Camera camera;             // refined; keypoints are pixels of its distorted image
+  Camera camera;  // refined; keypoints are pixels of its distorted image
+  // Those of frames that have another one, whose keypoints are pixels of it (GiveFrameCameras);
+  // files do not have them.
+  std::map<FrameId, Camera> frame_cameras;
   std::string image_folder;  // of the images; for a video, the file
   bool is_video = false;
   // Of the pyramid that the levels belong to.

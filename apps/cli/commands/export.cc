@@ -18,9 +18,11 @@
 #include "apps/cli/run_directory/run_masks.h"
 #include "apps/cli/terminal/progress.h"
 #include "output/export/colmap_model.h"
+#include "output/map/frame_cameras.h"
 #include "output/map/map_keypoints.h"
 #include "output/map/run_map.h"
 #include "output/map/view_graph_matches.h"
+#include "output/tables/focal_lengths_csv.h"
 #include "output/tables/rotations_csv.h"
 
 namespace rotslam {
@@ -120,7 +122,7 @@ int WriteMasksBeside(const std::string& format, const ExportJob& job) {
   std::vector<std::string> images;
   for (const MapFrame& frame : job.map.frames) images.push_back(frame.image);
   return ExportMasks(
-      job.run, images, fs::absolute(job.out).parent_path() / "masks", job.image_change);
+      job.run, images, fs::absolute(job.out).parent_path() / "masks", job.mask_change);
 }
 
 // The files of a COLMAP model, whose components lie in folders of their own instead.
@@ -237,16 +239,42 @@ fs::path FolderOfUndistorted(const ExportFlags& flags) {
   return fs::path(out).replace_filename(out.stem().string() + "_undistorted");
 }
 
-// Writes images without distortion, and takes the distortion out of what is exported.
+// The cameras of a run's frames where its lens zooms.
+using FrameCameras = std::map<FrameId, Camera>;
+
+FrameCameras ReadFrameCameras(const fs::path& run, const Camera& camera) {
+  FrameCameras cameras;
+  const fs::path file = run / "focal_lengths.csv";
+  if (!fs::exists(file)) return cameras;
+  for (const FocalLengthRow& row : ReadFocalLengthsCsv(file)) {
+    Camera& own = cameras[FrameId{row.frame}] = camera;
+    own.fx = row.fx;
+    own.fy = row.fy;
+    own.cx = row.cx;
+    own.cy = row.cy;
+  }
+  return cameras;
+}
+
+// Writes images without distortion, and takes the distortion out of what is exported. Six
+// parameters: the input, and what is changed.
+// @param cameras  become those without distortion.
 // @return  the folder of the images.
 fs::path Undistort(const ExportFlags& flags,
                    const RunMap& whole,
                    Progress& progress,
                    RunMap& map,
-                   ViewGraphMatches& matches) {
+                   ViewGraphMatches& matches,
+                   FrameCameras& cameras) {
   const Camera from = map.camera;
   const Camera to = UndistortedCamera(from);
-  const ImageUndistorter change(from, to);
+  const FrameCameras undistorted = UndistortedCameras(cameras, from, to);
+  const ImageUndistorter of_all(from, to);
+  const ImageChange change = [&](FrameId frame, const cv::Mat& image) {
+    const auto own = cameras.find(frame);
+    return own == cameras.end() ? of_all(image)
+                                : ImageUndistorter(own->second, undistorted.at(frame))(image);
+  };
   fs::path folder = FolderOfUndistorted(flags);
   const ImageObserver observer = ObserverOf(progress);
   if (flags.images.empty()) {
@@ -263,6 +291,7 @@ fs::path Undistort(const ExportFlags& flags,
   progress.EndStage();
   UndistortMap(to, map);
   UndistortMatches(from, to, matches);
+  cameras = undistorted;
   progress.Say("wrote " + folder.string() + ": images without distortion, " + Describe(to));
   return folder;
 }
@@ -340,11 +369,20 @@ int Export(const ExportFlags& flags) {
   if (flags.undistort && !undistorts) {
     progress.Say("note: the lens has no distortion, --undistort changes nothing");
   }
-  if (undistorts) {
-    job.image_change = ImageUndistorter(job.map.camera, UndistortedCamera(job.map.camera));
+  FrameCameras cameras = ReadFrameCameras(job.run, job.map.camera);
+  if (!cameras.empty() && format.has_one_camera) {
+    throw std::runtime_error(flags.run + ": the lens zooms, and " + flags.format +
+                             " has one camera for all images: it cannot say so");
   }
-  job.image_folder = undistorts ? Undistort(flags, whole, progress, job.map, matches)
+  if (undistorts) {
+    job.mask_change = ImageUndistorter(job.map.camera, UndistortedCamera(job.map.camera));
+  }
+  job.image_folder = undistorts ? Undistort(flags, whole, progress, job.map, matches, cameras)
                                 : FindImages(flags, whole, progress, job.map);
+  if (!cameras.empty()) {
+    GiveFrameCameras(cameras, job.map);
+    MoveToFrameCameras(job.map, matches);
+  }
   if (refers_to_images && !undistorts && flags.images.empty() && flags.extract.empty()) {
     WarnOfMissingImages(job.map, progress);
   }

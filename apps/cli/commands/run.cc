@@ -115,14 +115,17 @@ void DropTrackingFields(Orientations& orientations) {
 
 // Writes the files of a finished run into the folder of unfinished outputs, and publishes them.
 // @param positions  loses the tracks of its cloud, as WriteMaps says.
+// @param taken_out  as WriteFocalLengths takes it.
 RunSummary WriteRun(TrackedInput& tracked,
                     MapResult& positions,
+                    const Camera& taken_out,
                     PlyForm ply,
                     double orientations_s) {
   const double positions_s = SecondsSince(tracked.start) - orientations_s - tracked.lens_s;
   const std::filesystem::path& folder = tracked.outputs.folder();
   const Orientations& orientations = tracked.orientations;
   WritePositions(folder, orientations, positions, ply);
+  WriteFocalLengths(folder, orientations, positions, taken_out);
   WriteKnownRotationInput(folder,
                           orientations,
                           positions,
@@ -175,14 +178,18 @@ int FinishRun(TrackedInput& tracked, const RunOutputFlags& flags) {
     const EndAtInterruption end_at_interruption(tracked.interruption, end_early);
     return BuildMap(orientations, tracked.options, &tracked.frames, tracked.observer);
   }();
+  const Camera taken_out = tracked.working.Original(orientations.camera);
   if (positions.through_lens) {
     TakeThroughLens(positions, orientations);
     WriteOrientations(tracked.outputs.folder(), orientations, tracked.options.rotodom.averaging);
   }
   tracked.ToOriginalSize(positions);
   tracked.ToOriginalSize();
-  const RunSummary summary = WriteRun(
-      tracked, positions, flags.ascii ? PlyForm::kAscii : PlyForm::kBinary, orientations_s);
+  const RunSummary summary = WriteRun(tracked,
+                                      positions,
+                                      taken_out,
+                                      flags.ascii ? PlyForm::kAscii : PlyForm::kBinary,
+                                      orientations_s);
 
   Warn(tracked, positions, *summary.segments, progress);
   for (const CheckReason& reason : CheckRun(tracked.directory).reasons) {

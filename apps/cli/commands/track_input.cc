@@ -75,10 +75,13 @@ Orientations TrackFrames(TrackedInput& tracked,
   inputs.keep_features = keep_features;
   inputs.given = input.given_rotations;
   inputs.log = &tracked.checkpoint;
+  // For the maps by which zooms are followed.
+  SlamOptions options = tracked.options;
+  if (input.guess) FreeLens(PlainLens(tracked.working.Reduced(input.camera)), options.ba.lens);
   Orientations orientations = track ? track(tracked, inputs)
                                     : FindOrientations(tracked.frames,
                                                        tracked.working.Reduced(input.camera),
-                                                       tracked.options,
+                                                       options,
                                                        inputs,
                                                        tracked.observer);
   if (!orientations.IsUsable()) {

@@ -143,7 +143,9 @@ const std::map<std::string, Format>& Formats() {
         [](const ExportJob& job) {
           WriteStellaMap(
               job.out, job.map, DescribeMap(job.map, job.image_folder, job.common.NumThreads()));
-        }}},
+        },
+        false,
+        true}},
       {"tum",
        {FrameChoice::kAll, false, Places::kApart, "TUM trajectory", [](const ExportJob& job) {
           WriteTumTrajectory(job.out, ToTrajectory(job.map));

@@ -19,8 +19,9 @@ struct ExportJob {
   std::filesystem::path out;
   std::filesystem::path image_folder;
   const ViewGraphMatches* matches = nullptr;  // of all frames of the run
-  ImageChange image_change;                   // what --undistort does to images
-  int num_masks = 0;                          // in the folder masks beside `out`
+  // What --undistort does to masks.
+  std::function<cv::Mat(const cv::Mat& mask)> mask_change;
+  int num_masks = 0;  // in the folder masks beside `out`
   bool text = false;
   bool has_places = true;  // false: orientations alone
   CommonFlags common;
@@ -47,7 +48,8 @@ struct Format {
   Places places;
   const char* meaning;
   std::function<void(const ExportJob&)> write;
-  bool names_masks = false;  // beside every frame
+  bool names_masks = false;     // beside every frame
+  bool has_one_camera = false;  // for all images
 };
 
 /// The formats by their names.

@@ -157,7 +157,7 @@ void WriteFrame(const fs::path& folder,
   const fs::path file = folder / known.image;
   MakeFolder(file.parent_path());
   if (change) {
-    WritePng(fs::path(file).replace_extension(".png"), change(frame.image));
+    WritePng(fs::path(file).replace_extension(".png"), change(frame.id, frame.image));
   } else if (map.is_video) {
     WritePng(file, frame.image);
   } else {
@@ -242,7 +242,7 @@ void ChangeImages(const fs::path& from,
     if (decoded.image.empty()) continue;
     const fs::path file = (to / frame.image).replace_extension(".png");
     MakeFolder(file.parent_path());
-    WritePng(file, change(decoded.image));
+    WritePng(file, change(frame.id, decoded.image));
   }
 }
 

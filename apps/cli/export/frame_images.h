@@ -29,8 +29,8 @@ void CheckImages(const std::filesystem::path& run,
                  const ImageObserver& observer,
                  RunMap& map);
 
-/// Changes an image before it is written; null: it is written as it is.
-using ImageChange = std::function<cv::Mat(const cv::Mat& image)>;
+/// Changes the image of a frame before it is written; null: it is written as it is.
+using ImageChange = std::function<cv::Mat(FrameId frame, const cv::Mat& image)>;
 
 /// Writes the images of all frames that a run has read into `folder`, under the names that the map
 /// has for them: frames of a video and of a recording as PNG, image files as they are. Changed ones

@@ -79,6 +79,20 @@ Camera UndistortedCamera(const Camera& camera) {
   return zoomed(narrow);
 }
 
+std::map<FrameId, Camera> UndistortedCameras(const std::map<FrameId, Camera>& cameras,
+                                             const Camera& from,
+                                             const Camera& to) {
+  std::map<FrameId, Camera> result;
+  for (const auto& [frame, camera] : cameras) {
+    Camera& undistorted = result[frame] = to;
+    undistorted.fx *= camera.fx / from.fx;
+    undistorted.fy *= camera.fy / from.fy;
+    undistorted.cx = camera.cx;
+    undistorted.cy = camera.cy;
+  }
+  return result;
+}
+
 ImageUndistorter::ImageUndistorter(const Camera& from, const Camera& to)
     : columns_(to.height, to.width, CV_32F), rows_(to.height, to.width, CV_32F) {
   for (int y = 0; y < to.height; ++y) {

@@ -1,5 +1,7 @@
 #pragma once
 
+#include <map>
+
 #include <opencv2/core/mat.hpp>
 
 #include "output/map/run_map.h"
@@ -12,6 +14,11 @@ namespace rotslam {
 /// empty borders: the axis stays, the focal lengths keep their ratio.
 /// Throws std::runtime_error where there is none with less than ten times the focal length.
 Camera UndistortedCamera(const Camera& camera);
+
+/// The cameras of frames (see GiveFrameCameras) without distortion: `to` with their zoom.
+std::map<FrameId, Camera> UndistortedCameras(const std::map<FrameId, Camera>& cameras,
+                                             const Camera& from,
+                                             const Camera& to);
 
 /// Maps images of one camera to those of another that looks the same way.
 class ImageUndistorter {

@@ -1,9 +1,11 @@
 #include "apps/cli/run_directory/position_files.h"
 
+#include <iterator>
 #include <utility>
 
 #include "apps/cli/run_directory/map_segments.h"
 #include "output/export/known_rotation_file.h"
+#include "output/tables/focal_lengths_csv.h"
 #include "output/tables/pose_covariance_csv.h"
 #include "output/tables/poses_csv.h"
 #include "output/trajectory/trajectory.h"
@@ -95,6 +97,27 @@ void WriteKnownRotationInput(const std::filesystem::path& directory,
   input.sigma_rad = OrientationSigmas(orientations);
   input.tracks = positions.keyframe_tracks;
   WriteKnownRotation(directory / "known_rotation.txt", input);
+}
+
+void WriteFocalLengths(const std::filesystem::path& directory,
+                       const Orientations& orientations,
+                       const MapResult& positions,
+                       const Camera& taken_out) {
+  if (orientations.focal_scales.empty()) return;
+  const Camera& camera = positions.camera;
+  std::vector<FocalLengthRow> rows;
+  for (int k = 0; k < std::ssize(orientations.timestamps_s); ++k) {
+    const double scale = ScaleOf(orientations.focal_scales, FrameId{k});
+    // Zooms were taken out about the principal point of before.
+    const Eigen::Vector2d center = Zoomed(Eigen::Vector2d(camera.cx, camera.cy), taken_out, scale);
+    rows.push_back({k,
+                    orientations.timestamps_s[k],
+                    scale * camera.fx,
+                    scale * camera.fy,
+                    center.x(),
+                    center.y()});
+  }
+  WriteFocalLengthsCsv(directory / "focal_lengths.csv", rows);
 }
 
 }  // namespace rotslam

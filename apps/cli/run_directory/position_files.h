@@ -21,4 +21,12 @@ void WriteKnownRotationInput(const std::filesystem::path& directory,
                              const MapResult& positions,
                              const Camera& camera);
 
+/// Writes focal_lengths.csv where zooms were followed: the camera of every frame.
+/// @param taken_out  the camera through which zooms were taken out; bundle adjustment may have
+///                   refined it since.
+void WriteFocalLengths(const std::filesystem::path& directory,
+                       const Orientations& orientations,
+                       const MapResult& positions,
+                       const Camera& taken_out);
+
 }  // namespace rotslam

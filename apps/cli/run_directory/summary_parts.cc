@@ -11,6 +11,7 @@
 #include "apps/cli/input/lens_guess.h"
 #include "apps/cli/run_directory/map_segments.h"
 #include "apps/slam/connected_frames.h"
+#include "apps/slam/zoom/follow_zooms.h"
 #include "output/tables/lens_curve.h"
 #include "output/tables/poses_csv.h"
 
@@ -55,6 +56,12 @@ std::optional<SummaryTable> LensChecksOf(const Orientations& orientations) {
   if (zooms.empty() && !orientations.fisheye.IsFisheye()) return std::nullopt;
   SummaryTable table = {{"is_fisheye", orientations.fisheye.IsFisheye()},
                         {"zooms", static_cast<std::int64_t>(zooms.size())}};
+  if (!zooms.empty()) {
+    table.emplace_back("zooms_followed",
+                       std::all_of(zooms.begin(), zooms.end(), [&](const Zoom& zoom) {
+                         return IsFollowed(zoom, orientations.focal_scales);
+                       }));
+  }
   if (!zooms.empty()) {
     double factor = 1.0;
     for (const Zoom& zoom : zooms) factor *= zoom.factor;

@@ -16,6 +16,7 @@ constexpr const char* kSummary = "summary.json";
 constexpr std::array kOutputs = {"cameras.ply",
                                  "camera.yaml",
                                  "cloud.ply",
+                                 "focal_lengths.csv",
                                  "keyframes_tum.txt",
                                  "known_rotation.txt",
                                  "live_trajectory_tum.txt",

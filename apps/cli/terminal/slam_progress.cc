@@ -12,6 +12,7 @@
 #include "apps/slam/map_result.h"
 #include "apps/slam/orientations.h"
 #include "apps/slam/working_size/original_size.h"
+#include "apps/slam/zoom/follow_zooms.h"
 #include "rotodom/types/text_file.h"
 
 namespace rotslam {
@@ -224,8 +225,19 @@ void WarnOfFisheye(const Orientations& orientations, Progress& progress) {
                 "`model: equidistant`");
 }
 
-void WarnOfZooms(const std::vector<Zoom>& zooms, Progress& progress) {
-  for (const Zoom& zoom : zooms) {
+// @param working_scale  working pixels per pixel of the images.
+void TellOfZooms(const Orientations& orientations, double working_scale, Progress& progress) {
+  double focal_px = orientations.camera.MeanFocal() / working_scale;
+  for (const Zoom& zoom : orientations.zooms) {
+    if (IsFollowed(zoom, orientations.focal_scales)) {
+      const double before_px = focal_px;
+      focal_px *= zoom.factor;
+      progress.Say("a zoom from frame " + std::to_string(zoom.first.value) + " to " +
+                   std::to_string(zoom.last.value) + ": focal length " +
+                   FormatNumber("%.1f", before_px) + " -> " + FormatNumber("%.1f", focal_px) +
+                   " px, followed");
+      continue;
+    }
     progress.Warn("frames " + std::to_string(zoom.first.value) + " to " +
                   std::to_string(zoom.last.value) + ": the lens zooms, the focal length becomes " +
                   FormatNumber("%.2f", zoom.factor) +
@@ -375,7 +387,7 @@ void SlamProgress::OnEnd(SlamStage /*stage*/, const Orientations& orientations) 
   }
   WarnOfInterpolatedFrames(interpolated, unreadable_, progress_);
   WarnOfFisheye(orientations, progress_);
-  WarnOfZooms(orientations.zooms, progress_);
+  TellOfZooms(orientations, working_.scale(), progress_);
   WarnOfRotationScale(orientations.loops, progress_);
   WarnOfBreaks(orientations.breaks, progress_);
   WarnOfWeakTies(FindWeakTies(orientations), progress_);

@@ -21,6 +21,7 @@
 #include "output/export/colmap_model.h"
 #include "output/graph/g2o.h"
 #include "output/map/run_map.h"
+#include "output/tables/focal_lengths_csv.h"
 #include "output/trajectory/trajectory.h"
 #include "tests/apps/run_directory.h"
 #include "tests/apps/small_sequence.h"
@@ -105,6 +106,45 @@ TEST_F(ExportTest, OrientationsAloneAreExportedWhereTheySuffice) {
     EXPECT_EQ(refused.exit_code, 1);
     EXPECT_THAT(refused.error, HasSubstr("these do not: csv, euroc, g2o, kitti, tum"));
   }
+}
+
+// The run's keypoints are those of one camera; focal_lengths.csv leads to the images'.
+TEST_F(ExportTest, AZoomHasACameraForEachStretch) {
+  const fs::path run = folder_.path() / "zoomed";
+  fs::copy(RunFolder(), run, fs::copy_options::recursive);
+  const RunMap map = ReadRunMap(run / "map_all_frames.bin");
+  const Camera& camera = map.camera;
+  const auto scale_at = [&](FrameId frame) { return 2 * frame.value < kNumFrames ? 1.0 : 1.5; };
+  std::vector<FocalLengthRow> rows;
+  for (const MapFrame& frame : map.frames) {
+    const double scale = scale_at(frame.id);
+    rows.push_back({frame.id.value,
+                    frame.timestamp_s,
+                    scale * camera.fx,
+                    scale * camera.fy,
+                    camera.cx,
+                    camera.cy});
+  }
+  WriteFocalLengthsCsv(run / "focal_lengths.csv", rows);
+
+  const fs::path out = folder_.path() / "exported";
+  const auto exported = [&](const std::string& format, const std::string& name) {
+    return Rotslam(
+        {"export", run.string(), "--all-frames", "--to", format, "--out", (out / name).string()});
+  };
+  ASSERT_EQ(exported("colmap", "sparse").exit_code, 0);
+  const ColmapModel model = ReadColmapModel(out / "sparse");
+  ASSERT_EQ(model.cameras.size(), 2U);
+  for (const auto& [id, image] : model.images) {
+    const FrameId frame{id.value - ColmapImageId(FrameId{0})};
+    EXPECT_NEAR(model.cameras.at(image.camera).fx, scale_at(frame) * camera.fx, 1e-6);
+  }
+  EXPECT_LT(FiguresOf(model, model.reconstruction).mean_error_px, 1.5);
+  ASSERT_EQ(exported("nerf", "transforms.json").exit_code, 0);
+  EXPECT_THAT(ReadWholeFile(out / "transforms.json"), HasSubstr("fl_x"));
+  const CommandResult refused = exported("stella", "map.msg");
+  EXPECT_EQ(refused.exit_code, 1);
+  EXPECT_THAT(refused.error, HasSubstr("one camera for all images"));
 }
 
 TEST_F(ExportTest, CloudIsTheRunsOwn) {

@@ -152,6 +152,17 @@ const std::vector<Fault> kFaults = {
      Verdict::kLookAt,
      "frames 51-69",
      "1.40 times"},
+    {"FollowedZoom",
+     [](RunFacts& facts) {
+       facts.summary["lens_checks"] = {
+           {"is_fisheye", false},
+           {"zooms", 1},
+           {"zooms_followed", true},
+           {"zoom", {{"first_frame", 51}, {"last_frame", 69}, {"factor", 1.4}}}};
+     },
+     Verdict::kLookAt,
+     "frames 51-69",
+     "followed"},
     {"HeldToOdometry",
      [](RunFacts& facts) {
        SetStates(facts, 57, 60, PoseState::kHeld, "orientation held to the odometry: 3 deg");
