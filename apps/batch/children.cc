@@ -13,6 +13,8 @@
 #include <sys/wait.h>
 #include <unistd.h>
 
+#include "rotodom/types/stopwatch.h"
+
 namespace rotslam {
 namespace {
 
@@ -26,7 +28,7 @@ ChildEnd Describe(int status, const rusage& usage, Clock::time_point start) {
   ChildEnd end;
   end.exit_code = WIFEXITED(status) ? WEXITSTATUS(status) : 128 + WTERMSIG(status);
   end.cpu_s = Seconds(usage.ru_utime) + Seconds(usage.ru_stime);
-  end.wall_s = std::chrono::duration<double>(Clock::now() - start).count();
+  end.wall_s = SecondsSince(start);
   end.max_memory_kb = usage.ru_maxrss;
   return end;
 }
@@ -108,8 +110,9 @@ void Children::Start(int id,
   }
 }
 
-std::pair<int, ChildEnd> Children::Wait() {
+std::optional<std::pair<int, ChildEnd>> Children::Wait(std::chrono::milliseconds at_most) {
   if (running_.empty()) throw std::invalid_argument("no child runs");
+  const Clock::time_point deadline = Clock::now() + at_most;
   while (true) {
     for (auto child = running_.begin(); child != running_.end(); ++child) {
       int status = 0;
@@ -120,9 +123,25 @@ std::pair<int, ChildEnd> Children::Wait() {
       running_.erase(child);
       return ended;
     }
+    const auto left = std::chrono::duration_cast<std::chrono::nanoseconds>(deadline - Clock::now());
+    if (left.count() <= 0) return std::nullopt;
+    constexpr std::int64_t kSecond = 1'000'000'000;
+    const timespec time{left.count() / kSecond, left.count() % kSecond};
     // A child that ended since has left its signal, which comes now.
-    if (const int signal = sigwaitinfo(&signals_, nullptr); signal > 0) Take(signal);
+    if (const int signal = sigtimedwait(&signals_, nullptr, &time); signal > 0) Take(signal);
   }
+}
+
+std::map<int, ChildTimes> Children::TimesSoFar() const {
+  std::map<int, ChildTimes> times;
+  for (const auto& [pid, child] : running_) {
+    clockid_t clock{};
+    timespec cpu{};
+    if (clock_getcpuclockid(pid, &clock) != 0 || clock_gettime(clock, &cpu) != 0) continue;
+    times[child.id] = {static_cast<double>(cpu.tv_sec) + 1e-9 * static_cast<double>(cpu.tv_nsec),
+                       SecondsSince(child.start)};
+  }
+  return times;
 }
 
 void Children::Poll() {

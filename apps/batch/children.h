@@ -4,6 +4,7 @@
 #include <cstdint>
 #include <filesystem>
 #include <map>
+#include <optional>
 #include <string>
 #include <utility>
 #include <vector>
@@ -12,6 +13,11 @@
 #include <sys/types.h>
 
 namespace rotslam {
+
+struct ChildTimes {
+  double cpu_s = 0.0;
+  double wall_s = 0.0;
+};
 
 /// How a child process ended and what it took.
 struct ChildEnd {
@@ -38,8 +44,11 @@ class Children {
   /// @param id  by which Wait calls it.
   void Start(int id, const std::vector<std::string>& arguments, const std::filesystem::path& log);
 
-  /// Waits for the next child to end; there must be one.
-  std::pair<int, ChildEnd> Wait();
+  /// Waits for the next child to end; there must be one. nullopt: none has ended in that time.
+  std::optional<std::pair<int, ChildEnd>> Wait(std::chrono::milliseconds at_most);
+
+  /// The times that those that run have taken so far, by id.
+  std::map<int, ChildTimes> TimesSoFar() const;
 
   int num_running() const { return static_cast<int>(running_.size()); }
   /// Someone has asked for the end: no further child should start.

@@ -108,8 +108,8 @@ std::optional<BatchRecord> ReadRecord(const fs::path& directory) {
   try {
     BatchRecord record;
     record.request = json->at("request").dump();
-    record.earlier_cpu_s = json->value("earlier_cpu_s", 0.0);
-    record.earlier_wall_s = json->value("earlier_wall_s", 0.0);
+    record.earlier = {json->value("earlier_cpu_s", 0.0), json->value("earlier_wall_s", 0.0)};
+    record.running = {json->value("running_cpu_s", 0.0), json->value("running_wall_s", 0.0)};
     if (json->at("exit_code").is_null()) return record;
     const auto exit_code = Integer(json->at("exit_code"));
     const auto max_memory_kb = Integer(json->at("max_memory_kb"));
@@ -134,9 +134,13 @@ void WriteRecord(const fs::path& directory, const BatchRecord& record) {
             {"wall_s", record.end->wall_s},
             {"max_memory_kb", record.end->max_memory_kb}};
   }
-  if (record.earlier_wall_s > 0.0) {
-    json["earlier_cpu_s"] = record.earlier_cpu_s;
-    json["earlier_wall_s"] = record.earlier_wall_s;
+  if (record.earlier.wall_s > 0.0) {
+    json["earlier_cpu_s"] = record.earlier.cpu_s;
+    json["earlier_wall_s"] = record.earlier.wall_s;
+  }
+  if (!record.end && record.running.wall_s > 0.0) {
+    json["running_cpu_s"] = record.running.cpu_s;
+    json["running_wall_s"] = record.running.wall_s;
   }
   json["request"] = Json::parse(record.request);
   // A child may print any bytes.

@@ -25,8 +25,9 @@ struct BatchRecord {
   std::optional<ChildEnd> end;
   std::string error;  // the line that says why it failed
   // Time of the parts before interruptions. The total in `end` includes it.
-  double earlier_cpu_s = 0.0;
-  double earlier_wall_s = 0.0;
+  ChildTimes earlier = {};
+  // Without an end: of the part since, as last seen.
+  ChildTimes running = {};
 };
 
 /// nullopt where there is no record, or not a whole one.

@@ -18,6 +18,7 @@ PYBIND11_MODULE(rotslam, module) {
   rotslam::AddKnownRotation(module);
   rotslam::AddBundle(module);
   rotslam::AddReaders(module);
+  rotslam::AddMapReaders(module);
   rotslam::AddSlam(module);
   rotslam::AddLiveSlam(module);
   rotslam::AddEvaluation(module);

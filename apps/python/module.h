@@ -14,6 +14,7 @@ void AddKnownRotation(pybind11::module_& module);
 void AddAveraging(pybind11::module_& module);
 void AddBundle(pybind11::module_& module);
 void AddReaders(pybind11::module_& module);
+void AddMapReaders(pybind11::module_& module);  // after AddCamera
 void AddSlam(pybind11::module_& module);
 void AddLiveSlam(pybind11::module_& module);  // after AddSlam
 void AddEvaluation(pybind11::module_& module);

@@ -66,6 +66,38 @@ class Odometry:
     @property
     def num_frames(self) -> int: ...
 
+class Loop(NamedTuple):
+    frame: int
+    match: int
+    score: float
+    inliers: int
+    angle_deg: float
+    accepted: bool
+    turn_scale: float
+    scaled_angle_deg: float
+    edges: int
+
+class LoopedEstimate(NamedTuple):
+    world_from_cam: _Floats
+    covariance: Optional[_Floats]
+    flags: tuple[str, ...]
+    loops: list[Loop]
+    has_averaged: bool
+
+class LoopedOdometry:
+    def __init__(self, camera: Camera, options: _Options = None,
+                 vocabulary: Optional[_Path] = None, seed: int = 1, threads: int = 1) -> None: ...
+    def add(self, image: Optional[npt.NDArray[np.uint8]], timestamp: float) -> LoopedEstimate: ...
+    def finish(self) -> list[Loop]: ...
+    @property
+    def orientations(self) -> _Floats: ...
+    @property
+    def covariances(self) -> _Floats: ...
+    @property
+    def edges(self) -> dict[str, Any]: ...
+    @property
+    def num_frames(self) -> int: ...
+
 class Result:
     @property
     def trajectory(self) -> _Floats: ...
@@ -127,6 +159,8 @@ def read_relative_rotations(path: _Path, sigma_rad: float = ...) -> dict[str, An
 def read_known_rotation(path: _Path) -> dict[str, Any]: ...
 def read_trajectory(path: _Path, times: Optional[_Path] = None) -> _Floats: ...
 def read_orientations(path: _Path) -> _Floats: ...
+def read_run_map(path: _Path) -> dict[str, Any]: ...
+def read_colmap_model(path: _Path) -> dict[str, Any]: ...
 
 def evaluate(ground_truth: Union[_Path, _Array], estimate: Union[_Path, _Array],
              times: Optional[_Path] = None, max_gap_s: float = ..., images: int = 0,

@@ -75,8 +75,9 @@ struct ColmapFigures {
   int num_images = 0;
   int num_points = 0;
   int num_observations = 0;
-  double mean_error_px = 0.0;  // over the observations that their cameras can see
-  int num_seen = 0;            // of these
+  // Over the points, of each one's mean over the observations that their cameras can see.
+  double mean_error_px = 0.0;
+  int num_seen = 0;  // points with such observations
 };
 
 /// The figures for poses and points in the frames and tracks of `model`, by the images' cameras.

@@ -247,18 +247,20 @@ std::optional<double> SightErrorPx(const ColmapModel& model,
       .norm();
 }
 
-// The mean over a track.
-double SolvedErrorPx(const SolvedModel& made, const Track& track) {
-  const Eigen::Vector3d& point = made.solved.point_in_world.at(track.id);
+// The mean over a track's observations that their cameras can see; nullopt where there are none.
+std::optional<double> PointErrorPx(const ColmapModel& model,
+                                   const Reconstruction& map,
+                                   const Track& track) {
+  const Eigen::Vector3d& point = map.point_in_world.at(track.id);
   double sum_px = 0.0;
   int count = 0;
-  ForEachSight(made.model, track, [&](const Observation& observation, int keypoint) {
-    const auto error_px = SightErrorPx(made.model, made.solved, point, observation.frame, keypoint);
+  ForEachSight(model, track, [&](const Observation& observation, int keypoint) {
+    const auto error_px = SightErrorPx(model, map, point, observation.frame, keypoint);
     if (!error_px) return;
     sum_px += *error_px;
     ++count;
   });
-  return count == 0 ? 0.0 : sum_px / count;
+  return count == 0 ? std::nullopt : std::optional(sum_px / count);
 }
 
 // One form of the three files: numbers and names one after the other, lines where there are such.
@@ -378,7 +380,7 @@ std::string SolvedPoints(const SolvedModel& made, ColmapForm form) {
     text.Whole<std::uint64_t>(made.model.point_id.at(track.id));
     for (const double value : point->second) text.Number(value);
     for (const std::uint8_t value : track.rgb) text.Whole<std::uint8_t>(value);
-    text.Number(SolvedErrorPx(made, track));
+    text.Number(PointErrorPx(made.model, made.solved, track).value_or(0.0));
     text.Count(track.observations.size());
     ForEachSight(made.model, track, [&](const Observation& observation, int keypoint) {
       text.Whole<std::uint32_t>(static_cast<std::uint64_t>(observation.frame.value));
@@ -396,16 +398,13 @@ ColmapFigures FiguresOf(const ColmapModel& model, const Reconstruction& map) {
   figures.num_images = static_cast<int>(map.center_in_world.size());
   double sum_px = 0.0;
   for (const Track& track : map.tracks) {
-    const auto point = map.point_in_world.find(track.id);
-    if (point == map.point_in_world.end()) continue;
+    if (!map.point_in_world.contains(track.id)) continue;
     ++figures.num_points;
     figures.num_observations += static_cast<int>(track.observations.size());
-    ForEachSight(model, track, [&](const Observation& observation, int keypoint) {
-      const auto error_px = SightErrorPx(model, map, point->second, observation.frame, keypoint);
-      if (!error_px) return;
-      sum_px += *error_px;
-      ++figures.num_seen;
-    });
+    const auto error_px = PointErrorPx(model, map, track);
+    if (!error_px) continue;
+    sum_px += *error_px;
+    ++figures.num_seen;
   }
   if (figures.num_seen > 0) figures.mean_error_px = sum_px / figures.num_seen;
   return figures;

@@ -1,6 +1,7 @@
 #include "output/tables/pose_covariance_csv.h"
 
 #include <array>
+#include <cstddef>
 #include <stdexcept>
 #include <string>
 
@@ -31,6 +32,24 @@ void WritePoseCovarianceCsv(const std::filesystem::path& path,
     text += '\n';
   }
   ReplaceFile(path, text);
+}
+
+std::vector<PoseCovarianceRow> ReadPoseCovarianceCsv(const std::filesystem::path& path) {
+  constexpr std::size_t kNumColumns = 2 + 21;
+  std::vector<PoseCovarianceRow> rows;
+  for (const TextRow& text : ReadCsvRows(path, kNumColumns)) {
+    PoseCovarianceRow row;
+    row.frame = IntegerAt(path, text, 0, 0);
+    row.timestamp_s = NumberAt(path, text, 1);
+    std::size_t column = 2;
+    for (int r = 0; r < 6; ++r) {
+      for (int c = r; c < 6; ++c) {
+        row.covariance(r, c) = row.covariance(c, r) = NumberAt(path, text, column++);
+      }
+    }
+    rows.push_back(row);
+  }
+  return rows;
 }
 
 }  // namespace rotslam

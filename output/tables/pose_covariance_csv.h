@@ -21,4 +21,8 @@ struct PoseCovarianceRow {
 void WritePoseCovarianceCsv(const std::filesystem::path& path,
                             const std::vector<PoseCovarianceRow>& rows);
 
+/// Reads what WritePoseCovarianceCsv has written. Throws std::runtime_error with file, line and
+/// reason.
+std::vector<PoseCovarianceRow> ReadPoseCovarianceCsv(const std::filesystem::path& path);
+
 }  // namespace rotslam

@@ -46,7 +46,7 @@ constexpr int kMaxCertificateFactorisations = 8;
 /// Throws std::invalid_argument when the sizes differ, a weight is negative or an edge's view has
 /// no orientation.
 /// Error:   eigenvalues to 1e-12 of the largest weight of a view.
-/// Cost:    two to eight Cholesky factorisations of 3 n unknowns; 12 bytes per entry of the factor.
+/// Cost:    one to eight Cholesky factorisations of 3 n unknowns; 12 bytes per entry of the factor.
 /// Source:  Eriksson et al., Rotation Averaging and Strong Duality, CVPR 2018; Rosen, Scalable
 ///          Low-Rank Semidefinite Programming for Certifiably Correct Machine Perception, 2022, for
 ///          the factorisation as a test.

@@ -143,7 +143,7 @@ void ShowCertificate(const CertificateProgress& done, Progress& progress) {
   }
   const double once_s = done.products / kProductsPerSecond;
   if (2.0 * once_s < kSecondsToSay) return;
-  progress.Say("certificate: 2 to " + std::to_string(kMaxCertificateFactorisations) +
+  progress.Say("certificate: 1 to " + std::to_string(kMaxCertificateFactorisations) +
                " factorisations of about " + Text("%.0f s each", once_s) + " and " +
                Text("%.1f GB", kBytesPerEntry * done.entries / 1e9));
 }

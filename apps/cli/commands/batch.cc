@@ -1,4 +1,5 @@
 #include <algorithm>
+#include <chrono>
 #include <cstdio>
 #include <filesystem>
 #include <memory>
@@ -100,11 +101,11 @@ class Runner {
         progress_.Say(Name(k) + "done before");
         continue;
       }
-      while (children_.num_running() >= flags_.jobs) Finish(children_.Wait());
+      while (children_.num_running() >= flags_.jobs) FinishNext();
       if (children_.interrupted()) break;
       Start(k);
     }
-    while (children_.num_running() > 0) Finish(children_.Wait());
+    while (children_.num_running() > 0) FinishNext();
     return num_failed_;
   }
 
@@ -123,8 +124,11 @@ class Runner {
     const bool resume = WasInterrupted(task.directory, task.request);
     BatchRecord record{task.request, std::nullopt, ""};
     if (const auto before = ReadRecord(task.directory); resume && before) {
-      record.earlier_cpu_s = before->end ? before->end->cpu_s : before->earlier_cpu_s;
-      record.earlier_wall_s = before->end ? before->end->wall_s : before->earlier_wall_s;
+      const ChildTimes& first = before->earlier;
+      const ChildTimes& last = before->running;
+      record.earlier = before->end
+                           ? ChildTimes{before->end->cpu_s, before->end->wall_s}
+                           : ChildTimes{first.cpu_s + last.cpu_s, first.wall_s + last.wall_s};
     }
     try {
       PrepareRunDirectory(task.directory.string());
@@ -141,14 +145,42 @@ class Runner {
     progress_.Say(Name(k) + (resume ? "goes on where it was interrupted" : "started"));
   }
 
+  // Waits for the next one to end.
+  void FinishNext() {
+    constexpr std::chrono::seconds kNoteEvery(2);
+    bool has_ended = false;
+    while (!has_ended) {
+      if (const auto ended = children_.Wait(kNoteEvery)) {
+        Finish(*ended);
+        has_ended = true;
+      }
+      if (std::chrono::steady_clock::now() < noted_ + kNoteEvery) continue;
+      NoteTimes();
+      noted_ = std::chrono::steady_clock::now();
+    }
+  }
+
+  // The time until now counts when this process is killed and the next batch goes on.
+  void NoteTimes() const {
+    for (const auto& [k, times] : children_.TimesSoFar()) {
+      auto record = ReadRecord(tasks_[k].directory);
+      if (!record) continue;
+      record->running = times;
+      try {
+        WriteRecord(tasks_[k].directory, *record);
+      } catch (const std::runtime_error&) {
+        // The disk may be full for a while. Finish() says so where it lasts.
+      }
+    }
+  }
+
   void Finish(const std::pair<int, ChildEnd>& ended) {
     const int k = ended.first;
     BatchRecord record{tasks_[k].request, ended.second, ""};
     if (const auto started = ReadRecord(tasks_[k].directory)) {
-      record.earlier_cpu_s = started->earlier_cpu_s;
-      record.earlier_wall_s = started->earlier_wall_s;
-      record.end->cpu_s += record.earlier_cpu_s;
-      record.end->wall_s += record.earlier_wall_s;
+      record.earlier = started->earlier;
+      record.end->cpu_s += record.earlier.cpu_s;
+      record.end->wall_s += record.earlier.wall_s;
     }
     if (record.end->exit_code != 0) record.error = LastErrorLine(LogOf(k));
     WriteRecord(tasks_[k].directory, record);
@@ -170,6 +202,7 @@ class Runner {
   const BatchFlags& flags_;
   Progress progress_;
   Children children_;
+  std::chrono::steady_clock::time_point noted_ = std::chrono::steady_clock::now();
   int num_failed_ = 0;
 };
 

@@ -67,6 +67,53 @@ class OnASequence(unittest.TestCase):
         other, _, _ = self.add_all(options={"averaging": {"mode": "off"}})
         self.assertGreater(np.abs(plain[23] - other[23]).max(), 1e-9)
 
+    def test_loops_are_those_of_the_program(self):
+        # A turn there and back, so that the camera sees the first places again.
+        there = self.folder / "there"
+        run_program("simulate", "gimbal", "--frames=24", "--width=320", "--height=240", "--quiet",
+                    "--out", there)
+        images = [image for image, _ in rotslam.Sequence(there)]
+        camera = rotslam.Sequence(there).camera
+        images += images[-2::-1]
+        options = {"loop": {"place_overlap": 0.95, "candidates": {"recent_frames": 4}}}
+        folder = self.folder / "back"
+        folder.mkdir()
+        files = sorted((there / "rgb").iterdir())
+        for frame, file in enumerate(files + files[-2::-1]):
+            os.link(file, folder / f"{10000 + frame}.png")
+        (self.folder / "loops.yaml").write_text(json.dumps(options))
+        run_program("rotations", folder, "--camera", there / "camera.yaml", "--config",
+                    self.folder / "loops.yaml", "--quiet", "--out", self.folder / "looped")
+        expected = np.loadtxt(self.folder / "looped/loops.csv", delimiter=",", skiprows=1)
+        odometry = rotslam.LoopedOdometry(camera, options=options, threads=2)
+        loops, has_averaged = [], False
+        for frame, image in enumerate(images):
+            estimate = odometry.add(image, frame / 30)
+            loops += estimate.loops
+            has_averaged |= estimate.has_averaged
+        loops += odometry.finish()
+        self.assertGreater(sum(loop.accepted for loop in loops), 0)
+        np.testing.assert_allclose(loops, expected, rtol=1e-4, atol=1e-4)
+        found = odometry.orientations
+        np.testing.assert_allclose(
+            found, np.loadtxt(self.folder / "looped/rotations_tum.txt")[:, 4:], rtol=0, atol=1e-9)
+        self.assertEqual(odometry.covariances.shape, (odometry.num_frames, 3, 3))
+        edges = odometry.edges
+        pairs = set(zip(edges["i"], edges["j"]))
+        for loop in loops:
+            if loop.edges > 0:
+                self.assertIn((loop.match, loop.frame), pairs)
+        averaged = rotslam.average_rotations(*(edges[name] for name in ("i", "j", "j_from_i")),
+                                             covariance=edges["covariance"])
+        self.assertEqual(averaged["cam_from_world"].shape, (len(images), 3, 3))
+        with self.assertRaisesRegex(ValueError, "no frame can follow"):
+            odometry.add(images[0], 100)
+        self.assertEqual(odometry.finish(), [])
+        with self.assertRaisesRegex(ValueError, "the nearest one is"):
+            rotslam.LoopedOdometry(camera, options={"loop": {"use_loop": False}})
+        with self.assertRaisesRegex(RuntimeError, "none.bin"):
+            rotslam.LoopedOdometry(camera, vocabulary=self.folder / "none.bin")
+
     def test_evaluate_gives_the_numbers_of_eval(self):
         orientations, timestamps, _ = self.add_all()
         rows = rows_of(orientations, timestamps)
@@ -400,6 +447,101 @@ class Readers(unittest.TestCase):
             self.assertEqual(read["camera"].fx, 500)
             with self.assertRaisesRegex(RuntimeError, "nowhere"):
                 rotslam.read_trajectory(Path(folder) / "nowhere")
+
+    def test_colmap_models(self):
+        with tempfile.TemporaryDirectory() as folder:
+            model = Path(folder)
+            (model / "cameras.txt").write_text("1 PINHOLE 640 480 500 500 320.5 240.5\n"
+                                               "9 SIMPLE_RADIAL 800 600 700 400.5 300.5 -0.05\n")
+            (model / "images.txt").write_text("3 1 0 0 0 0 0 0 9 a.png\n10.5 20.5 -1 100.5 200.5 "
+                                              "9000000000\n8 1 0 0 0 -1 0 2 1 b.png\n"
+                                              "300.5 100.5 9000000000\n")
+            (model / "points3D.txt").write_text("9000000000 1 2 3 10 20 30 0.5 3 1 8 0\n")
+            read = rotslam.read_colmap_model(model)
+            self.assertEqual(read["names"], ["a.png", "b.png"])
+            np.testing.assert_array_equal(read["image_ids"], [3, 8])
+            np.testing.assert_array_equal(read["camera_ids"], [9, 1])
+            self.assertEqual(set(read["cameras"]), {1, 9})
+            self.assertEqual(read["cameras"][1].model, "pinhole")
+            self.assertEqual(read["cameras"][9].distortion[0], -0.05)
+            self.assertEqual((read["camera"].fx, read["camera"].distortion), (700, [0] * 5))
+            np.testing.assert_array_equal(read["cam_from_world"], [np.eye(3)] * 2)
+            np.testing.assert_array_equal(read["centers"], [[0, 0, 0], [1, 0, -2]])
+            np.testing.assert_array_equal(read["image_keypoints_px"][0],
+                                          [[10.5, 20.5], [100.5, 200.5]])
+            np.testing.assert_array_equal(read["point_ids"], [9000000000])
+            np.testing.assert_array_equal(read["points"], [[1, 2, 3]])
+            np.testing.assert_array_equal(read["colours"], [[10, 20, 30]])
+            np.testing.assert_array_equal(read["view"], [0, 1])
+            np.testing.assert_array_equal(read["track"], [0, 0])
+            np.testing.assert_array_equal(read["keypoint"], [1, 0])
+            # Of a pinhole with 500 px, in one with 700.
+            np.testing.assert_allclose(read["keypoints_px"][1],
+                                       1.4 * (np.array([300, 100]) - [320, 240])
+                                       + [read["camera"].cx, read["camera"].cy])
+            np.testing.assert_allclose(read["sigma_px"][1], 1.4)
+            self.assertEqual(read["num_doubled"], 0)
+            (model / "points3D.txt").write_text("9000000000 1 2 3 10 20 30 0.5 3 1 4 0\n")
+            with self.assertRaisesRegex(RuntimeError, "names image 4"):
+                rotslam.read_colmap_model(model)
+
+    def test_the_map_of_a_run(self):
+        with tempfile.TemporaryDirectory() as temporary:
+            folder = Path(temporary)
+            run_program("simulate", "handheld", "--frames=24", "--width=320", "--height=240",
+                        "--quiet", "--out", folder / "sequence")
+            (folder / "options.yaml").write_text("ba: {find_covariance: true}\n")
+            run_program("run", folder / "sequence", "--config", folder / "options.yaml", "--quiet",
+                        "--out", folder / "run")
+            read = rotslam.read_run_map(folder / "run")
+            summary = json.loads((folder / "run/summary.json").read_text())
+            num_frames, num_tracks = len(read["frames"]), len(read["track_ids"])
+            self.assertEqual(num_frames, 24)
+            self.assertEqual(int(read["is_keyframe"].sum()), summary["counts"]["keyframes"])
+            self.assertEqual(len(read["names"]), 24)
+            self.assertEqual(read["camera"].width, 320)
+            poses = rotslam.read_trajectory(folder / "run/trajectory_tum.txt")
+            np.testing.assert_allclose(read["timestamps"], poses[:, 0], atol=1e-6)
+            np.testing.assert_allclose(read["centers"], poses[:, 1:4], atol=1e-6)
+            np.testing.assert_allclose(
+                [quaternion(R.T) * np.sign(q[3]) for R, q in zip(read["cam_from_world"], poses[:, 4:])],
+                poses[:, 4:], atol=1e-6)
+            self.assertEqual(read["points"].shape, (num_tracks, 3))
+            self.assertEqual((read["colours"].shape, read["colours"].dtype),
+                             ((num_tracks, 3), np.uint8))
+            # A point lies where the observations that fit it are.
+            view, track = (read[name][read["fits"]] for name in ("view", "track"))
+            rays = read["points"][track] - read["centers"][view]
+            in_camera = np.einsum("kij,kj->ki", read["cam_from_world"][view], rays)
+            self.assertTrue((in_camera[:, 2] > 0).all())
+            camera = read["camera"]
+            self.assertEqual(camera.model, "pinhole")
+            pixels = (in_camera[:, :2] / in_camera[:, 2:] * [camera.fx, camera.fy]
+                      + [camera.cx, camera.cy])
+            misses = np.linalg.norm(pixels - read["keypoints_px"][read["fits"]], axis=1)
+            self.assertLess(np.median(misses), 0.5)
+            covariance = read["pose_covariance"]
+            known = np.isfinite(covariance).all(axis=(1, 2))
+            table = np.loadtxt(folder / "run/pose_covariance.csv", delimiter=",", skiprows=1)
+            np.testing.assert_array_equal(read["frames"][known], table[:, 0])
+            np.testing.assert_array_equal(covariance[known][:, 0, 0], table[:, 2])
+            np.testing.assert_array_equal(covariance, covariance.transpose(0, 2, 1))
+            edges = read["edges"]
+            self.assertEqual(len(edges["i"]), len(edges["num_inliers"]))
+            self.assertLess(edges["j"].max(), num_frames)
+            # As refine_bundle takes it.
+            fits = read["fits"]
+            adjusted = rotslam.refine_bundle(
+                read["cam_from_world"], read["centers"], view, track, read["keypoints_px"][fits],
+                read["camera"], sigma_px=read["sigma_px"][fits])
+            self.assertTrue(adjusted["is_usable"], adjusted["message"])
+            (folder / "alone").mkdir()
+            (folder / "run/map.bin").rename(folder / "alone/map.bin")
+            alone = rotslam.read_run_map(folder / "alone/map.bin")
+            self.assertIsNone(alone["pose_covariance"])
+            np.testing.assert_array_equal(alone["points"], read["points"])
+            with self.assertRaisesRegex(RuntimeError, "map.bin"):
+                rotslam.read_run_map(folder / "run")
 
     def test_stubs_name_what_there_is(self):
         stubs = ast.parse(Path(rotslam.__file__).with_name("rotslam.pyi").read_text())

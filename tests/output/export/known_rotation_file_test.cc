@@ -204,6 +204,23 @@ TEST(KnownRotationFile, ReadsAndWritesModelsOfSeveralCameras) {
   EXPECT_THAT(ReadWholeFile(folder.path() / "out" / "images.bin").substr(0, 1), testing::Eq("\2"));
 }
 
+// COLMAP's mean error counts each point once, however often it is seen.
+TEST(KnownRotationFile, TheMeanErrorOfAModelIsOverItsPoints) {
+  const TemporaryFolder folder;
+  std::ofstream(folder.path() / "cameras.txt") << "1 PINHOLE 640 480 500 500 320 240\n";
+  std::ofstream(folder.path() / "images.txt") << "1 1 0 0 0 0 0 0 1 a.png\n320 243 5 420 240 6\n"
+                                                 "2 1 0 0 0 0 0 0 1 b.png\n320 243 5\n"
+                                                 "3 1 0 0 0 0 0 0 1 c.png\n320 240 5 420 241 6\n"
+                                                 "4 1 0 0 0 0 0 0 1 d.png\n320 240 5\n";
+  std::ofstream(folder.path() / "points3D.txt")
+      << "5 0 0 5 1 1 1 1.5 1 0 2 0 3 0 4 0\n6 1 0 5 1 1 1 0.5 1 1 3 1\n";
+  const ColmapModel model = ReadColmapModel(folder.path());
+  const ColmapFigures figures = FiguresOf(model, model.reconstruction);
+  EXPECT_EQ(figures.num_observations, 6);
+  EXPECT_EQ(figures.num_seen, 2);
+  EXPECT_NEAR(figures.mean_error_px, 0.5 * (1.5 + 0.5), 1e-12);  // over observations: 7 / 6
+}
+
 TEST(KnownRotationFile, ReadsBal) {
   const TemporaryFolder folder;
   const Scene scene = SmallScene();

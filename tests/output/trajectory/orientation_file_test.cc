@@ -99,6 +99,13 @@ TEST(PoseCovarianceCsv, HasTheUpperTriangleRowByRow) {
   EXPECT_THAT(text,
               HasSubstr("z_z\n4,1.250000000,0,1,2,3,4,5,11,12,13,14,15,22,23,24,25,33,34,35,44,45,"
                         "55\n"));
+  const std::vector<PoseCovarianceRow> read = ReadPoseCovarianceCsv(file);
+  ASSERT_EQ(read.size(), 1u);
+  EXPECT_EQ(read[0].frame, 4);
+  EXPECT_EQ(read[0].timestamp_s, 1.25);
+  EXPECT_EQ(read[0].covariance, row.covariance);
+  const auto torn = folder.Write("torn.csv", text.substr(0, text.size() - 4));
+  EXPECT_THAT(RuntimeErrorOf([&] { ReadPoseCovarianceCsv(torn); }), HasSubstr("torn.csv:2: "));
   row.covariance(2, 3) = std::numeric_limits<double>::quiet_NaN();
   EXPECT_THROW(WritePoseCovarianceCsv(file, {row}), std::invalid_argument);
   EXPECT_EQ(ReadWholeFile(file), text) << "the file stays as it was";
