@@ -60,15 +60,6 @@ BundleState WithSomeTracks(const BundleState& state, int num_wanted) {
   return part;
 }
 
-// The points that are known, for Placement::kWhereKnown.
-void SetPositions(const PointMap& point_in_world, BundleState& state) {
-  for (TrackState& entry : state.tracks) {
-    const auto known = point_in_world.find(entry.track->id);
-    entry.has_position = known != point_in_world.end();
-    if (entry.has_position) entry.position = known->second;
-  }
-}
-
 // Takes the cameras over from a part, and how its observations are weighed.
 void TakeCameras(const BundleState& part, int num_threads, BundleState& state) {
   state.has_motion_blur = part.has_motion_blur;
@@ -353,7 +344,6 @@ BundleResult RefineBundle(const BundleProblem& problem,
                           const TrackCompletion& complete) {
   const auto start = std::chrono::steady_clock::now();
   BundleState state = MakeBundleState(problem, options);
-  if (options.start_at_points) SetPositions(problem.start.point_in_world, state);
   BundleResult result;
   Rounds rounds(problem.camera, options, result);
   const bool in_part = options.preparing_observations > 0 && options.fine.enabled;
@@ -378,8 +368,7 @@ BundleResult RefineBundle(const BundleProblem& problem,
   }
   const BundleRound final_round = rounds.Narrow(preparing);
   if (part) TakeCameras(*part, options.num_threads, state);
-  const Placement unseen = options.start_at_points ? Placement::kWhereKnown : Placement::kAnywhere;
-  rounds.RunFinal(final_round, part ? unseen : Placement::kNearby, state);
+  rounds.RunFinal(final_round, part ? Placement::kAnywhere : Placement::kNearby, state);
 
   BundleSummary& summary = result.summary;
   for (const BundleRoundSummary& round : summary.rounds) summary.iterations += round.iterations;
@@ -411,7 +400,11 @@ BundleResult RefineBundle(const BundleProblem& problem,
 
 Reconstruction TriangulateTracks(BundleProblem problem, const BundleOptions& options) {
   BundleState state = MakeBundleState(problem, options);
-  SetPositions(problem.start.point_in_world, state);
+  for (TrackState& entry : state.tracks) {
+    const auto known = problem.start.point_in_world.find(entry.track->id);
+    entry.has_position = known != problem.start.point_in_world.end();
+    if (entry.has_position) entry.position = known->second;
+  }
   ClassifyAll(options.fine, Placement::kWhereKnown, options, state);
   Reconstruction map = std::move(problem.start);
   map.point_in_world.clear();

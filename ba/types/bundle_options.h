@@ -178,9 +178,6 @@ struct BundleOptions {
 
   // A track with fewer fitting observations is dropped. Two serve where nothing has three.
   int min_track_observations = kMinTrackObservations;
-  // The final stage seeks points that the problem gives near where they are. Off: anywhere, at
-  // twice the time where that stage only triangulates; the result depends on the poses alone.
-  bool start_at_points = false;
 
   // Up to this many frames the reduced system is factored densely (DENSE_SCHUR), above by CHOLMOD
   // (SPARSE_SCHUR).

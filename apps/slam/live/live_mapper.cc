@@ -30,7 +30,6 @@ BundleOptions WindowOptions(BundleOptions options) {
   options.fixed_rotation.enabled = false;
   options.preparing_observations = kWindowObservations;
   options.max_final_rounds = 0;
-  options.start_at_points = true;
   // Points are needed soon; what two keyframes see is checked by every frame that sees it.
   options.min_track_observations = 2;
   options.num_threads = 1;

@@ -71,8 +71,8 @@ BaScene WithCommonErrors(BaScene scene, double amplitude_px, std::uint32_t seed)
 TEST(CalibrationCheck, NoticesAFocalLengthThatIsFivePercentOff) {
   BaSceneOptions options;
   options.noise_px = kNoisePx;
-  options.num_frames = 40;
-  options.num_points = 1500;
+  options.num_frames = 80;
+  options.num_points = 3000;
   const BaScene scene = MakeBaScene(options);
   for (const double share : {0.95, 1.05}) {
     const CalibrationCheck check = CheckOf(scene, share);
