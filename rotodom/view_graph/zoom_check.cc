@@ -25,9 +25,8 @@ constexpr int kMaxGap = 3;
 // Natural logarithms of ratios of focal lengths: of a pair, below which it shows no zoom; without
 // one, real cameras show up to 0.0075.
 constexpr double kMinLogRatio = 0.006;
-// The same in the mean of a zoom's pairs, and of all of them together.
+// The same in the mean of a zoom's pairs.
 constexpr double kMinMeanLogRatio = 0.01;
-constexpr double kMinLogRatioOfAll = 0.08;
 // Of a pair; lenses are slower.
 constexpr double kMaxLogRatio = 0.3;
 // Of all pairs: farther than any lens reaches.
@@ -412,7 +411,7 @@ std::optional<Zoom> ZoomOf(const std::vector<ZoomStep>& steps, int first, int la
   if (num_known < kLeastSteps) return std::nullopt;
   const double mean = sum / num_known;
   const double log_factor = mean * (last - first + 1);  // those in doubt as the others
-  if (std::abs(mean) < kMinMeanLogRatio || std::abs(log_factor) < kMinLogRatioOfAll ||
+  if (std::abs(mean) < kMinMeanLogRatio || std::abs(log_factor) < kLeastLogZoom ||
       std::abs(sum) < kMinSigmasOfAll * std::sqrt(variance)) {
     return std::nullopt;
   }

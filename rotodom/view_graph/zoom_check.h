@@ -10,6 +10,9 @@
 
 namespace rotslam {
 
+/// Natural logarithm of a ratio of focal lengths from which on it is a zoom: 8 %.
+inline constexpr double kLeastLogZoom = 0.08;
+
 /// A change of the focal length from one frame to a later one.
 struct Zoom {
   FrameId first;

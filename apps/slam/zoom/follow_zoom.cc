@@ -319,7 +319,9 @@ std::optional<FollowedZoom> FollowZoom(const OdometryResult& tracked,
   path.Adjust();
   if (!path.SplitIntoStretches()) return std::nullopt;
   path.Adjust();
-  return path.Result();
+  FollowedZoom followed = path.Result();
+  if (std::abs(std::log(followed.zoom.factor)) < kLeastLogZoom) return std::nullopt;
+  return followed;
 }
 
 }  // namespace rotslam

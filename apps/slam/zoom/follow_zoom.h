@@ -37,8 +37,8 @@ struct FollowedZoom {
 /// @param tracked  with features and matches.
 /// @param camera   of the frames before the zoom.
 /// @param zoom     where one was found (FindZooms); its size does not count.
-/// @return  nullopt where the frames before it give no map, or its frames show too few of its
-///          points.
+/// @return  nullopt where the frames before it give no map, its frames show too few of its points,
+///          or the focal length changes by less than kLeastLogZoom.
 /// Error:   0.5 % of the focal length in every frame (0.3 px, f = 500; tests), 0.4 to 1.4 % in real
 ///          footage zoomed by 1.4 (docs/footage.md).
 std::optional<FollowedZoom> FollowZoom(const OdometryResult& tracked,

@@ -133,6 +133,10 @@ TEST(FollowZoom, FollowsNoneThatIsNone) {
   EXPECT_FALSE(Follow({Ahead, [](int) { return 1.0; }}).has_value());
 }
 
+TEST(FollowZoom, TakesASmallChangeForNone) {
+  EXPECT_FALSE(Follow({Sideways, Ramp(1.0, 1.05)}).has_value());
+}
+
 TEST(FollowZoom, NeedsFramesBeforeIt) {
   EXPECT_FALSE(Follow({Sideways, Ramp(1.0, 1.4)}, 8).has_value());
 }
