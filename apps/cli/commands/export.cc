@@ -307,8 +307,8 @@ void WarnOfMissingImages(const RunMap& map, Progress& progress) {
   }
 }
 
-// What `solve` made of a COLMAP model of several cameras has a common one without distortion in its
-// map, which shows none of the images.
+// `solve` gives the map of a COLMAP model of several cameras one common camera. It is the camera of
+// none of the images.
 void RefuseSeveralCameras(const ExportFlags& flags) {
   const fs::path sparse = fs::path(flags.run) / "sparse";
   const fs::path model = sparse / "0";

@@ -19,7 +19,7 @@ struct ExportJob {
   std::filesystem::path out;
   std::filesystem::path image_folder;
   const ViewGraphMatches* matches = nullptr;  // of all frames of the run
-  // What --undistort does to masks.
+  // Takes the distortion out of a mask; empty without --undistort.
   std::function<cv::Mat(const cv::Mat& mask)> mask_change;
   int num_masks = 0;  // in the folder masks beside `out`
   bool text = false;

@@ -164,7 +164,7 @@ Drawing RegistrationFigure(const RunData& run) {
 
 void AddMapFigures(const RunData& run, std::vector<Figure>& figures) {
   if (run.cloud && !run.cloud->tracks.empty()) {
-    // What `solve` made of a BAL file has no size of images.
+    // A BAL file does not say how large its images are; the figure needs their size.
     if (run.cloud->camera.width > 0) figures.push_back({"tracks", TracksFigure(run)});
     figures.push_back({"keyframes", KeyframesFigure(run)});
     if (run.HasPositions()) figures.push_back({"registration", RegistrationFigure(run)});

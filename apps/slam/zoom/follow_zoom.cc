@@ -84,7 +84,7 @@ class RayPoint {
     if (num_rays_ < 3 || angle_rad_ < kMinAngle_rad) return std::nullopt;
     return normal_.ldlt().solve(right_);
   }
-  // Of a camera that stays in its place.
+  // Where the point is seen by a camera that only rotates, which tells no depth.
   Eigen::Vector3d Direction() const { return direction_.normalized(); }
   double angle_rad() const { return angle_rad_; }
 
@@ -164,7 +164,7 @@ class ZoomPath {
       ++last;
     }
     const double at_end = Median({log_scales.begin() + last, log_scales.end()}, log_scales.back());
-    if (std::abs(at_end) < kBegun) return false;
+    if (std::abs(at_end) < kLeastLogZoom) return false;
     for (int n = 0; n < first; ++n) {
       unzoomed_.insert(frames[n]);
       poses_.at(frames[n]).log_scale = 0.0;
@@ -230,7 +230,7 @@ class ZoomPath {
     }
   }
 
-  // Where the frame is by the one before it, as if nothing changed.
+  // The pose that the next frame has if movement and zoom go on as before.
   ZoomedPose StartOf(FrameId frame) const {
     const auto newest = poses_.rbegin();
     const auto before = std::next(newest);
@@ -277,7 +277,7 @@ class ZoomPath {
       const Features& features = found->second;
       const std::size_t step = 1 + features.tracks.size() / kMostPoints;
       for (std::size_t n = 0; n < features.tracks.size(); ++n) {
-        // Of all tracks, the same ones in every frame.
+        // Tracks are left out by their number, so that a track is left out of all frames alike.
         if (features.tracks[n].value % static_cast<int>(step) != 0) continue;
         Track& track = tracks[features.tracks[n]];
         track.id = features.tracks[n];
@@ -319,9 +319,7 @@ std::optional<FollowedZoom> FollowZoom(const OdometryResult& tracked,
   path.Adjust();
   if (!path.SplitIntoStretches()) return std::nullopt;
   path.Adjust();
-  FollowedZoom followed = path.Result();
-  if (std::abs(std::log(followed.zoom.factor)) < kLeastLogZoom) return std::nullopt;
-  return followed;
+  return path.Result();
 }
 
 }  // namespace rotslam

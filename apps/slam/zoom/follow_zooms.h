@@ -37,7 +37,7 @@ std::optional<ZoomsFollowed> FollowZooms(const OdometryResult& filmed,
                                          const MapOfPart& map_of_part,
                                          const ZoomOptions& options);
 
-/// Whether the focal lengths of the frames change as a zoom says.
+/// Whether the focal length at the end of a zoom is the one that it tells, to 2 %.
 bool IsFollowed(const Zoom& zoom, const FocalScales& scales);
 
 }  // namespace rotslam

@@ -46,7 +46,7 @@ MaskedImage WithoutZoom(const MaskedImage& filmed, const Camera& camera, double 
   const cv::Matx23d to_camera(
       back, 0.0, (1.0 - back) * camera.cx, 0.0, back, (1.0 - back) * camera.cy);
   cv::Mat image = filmed.image;
-  // What is finer than the pixels to come would shimmer.
+  // The image becomes smaller: it is smoothed first, against aliasing.
   if (scale > 1.0) {
     cv::GaussianBlur(image, image, {0, 0}, 0.5 * std::sqrt(scale * scale - 1.0));
   }

@@ -134,7 +134,7 @@ TEST(FollowZoom, FollowsNoneThatIsNone) {
 }
 
 TEST(FollowZoom, TakesASmallChangeForNone) {
-  EXPECT_FALSE(Follow({Sideways, Ramp(1.0, 1.05)}).has_value());
+  EXPECT_FALSE(Follow({Sideways, Ramp(1.0, 1.07)}).has_value());
 }
 
 TEST(FollowZoom, NeedsFramesBeforeIt) {
